@@ -1,0 +1,21 @@
+set(CMAKE_CXX_STANDARD 17)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Release unless asked otherwise" FORCE)
+endif()
+if(NOT DEFINED CATKIN_ENABLE_TESTING)
+  set(CATKIN_ENABLE_TESTING ON CACHE BOOL "Configure the tests")
+endif()
+
+# -ffp-contract=off: the same input gives the same bytes whichever target a function is compiled for.
+add_compile_options(-ffp-contract=off)
+add_library(kinect_nav_warnings INTERFACE)
+target_compile_options(kinect_nav_warnings INTERFACE -Wall -Wextra -Wconversion)
+
+if(KINECT_NAV_SANITIZE)
+  add_compile_options(-fsanitize=${KINECT_NAV_SANITIZE} -fno-omit-frame-pointer -g)
+  add_link_options(-fsanitize=${KINECT_NAV_SANITIZE})
+endif()
