@@ -1,0 +1,151 @@
+// replay: a recording through the front end and the local mapper, without a master, as fast as the CPU allows.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "core/config.h"
+#include "core/error.h"
+#include "core/progress.h"
+#include "core/trajectory.h"
+#include "depth_profile_nodelet/front_end.h"
+#include "global_map_builder/observation_reader.h"
+#include "ros_common/command_line.h"
+#include "tools/local_map_picture.h"
+#include "tsdf_local_mapper/local_mapper.h"
+
+namespace knav {
+namespace {
+
+struct Options {
+  std::string bag, trajectory, config, map_out, json;
+  std::string from = "auto";
+  int seed = -1;
+  bool odometry_only = false;
+};
+
+const char* const kJsonHelp =
+    R"(The JSON holds source, frames, frames_accepted, frames_rejected (counts), recording_s, elapsed_s,
+speed_ratio (recording_s / elapsed_s), epochs (count), path_m (length of the estimate), seed.)";
+
+FrontEndConfig read_front_end_config(const std::string& path) {
+  FrontEndConfig config;
+  config.depth_correction = read_config_section<decltype(config.depth_correction)>(path, "depth_correction");
+  config.rolling_shutter = read_config_section<decltype(config.rolling_shutter)>(path, "rolling_shutter");
+  config.floor_removal = read_config_section<decltype(config.floor_removal)>(path, "floor_removal");
+  config.depth_profile = read_config_section<decltype(config.depth_profile)>(path, "depth_profile");
+  return config;
+}
+
+/// Gathers what the mapper says of each frame. Across epochs the trajectory goes on by odometry.
+class Recorder {
+ public:
+  explicit Recorder(const LocalMapperConfig& config) : mapper_(config) {}
+
+  void add_odometry(double stamp_s, const Pose2& T_odom_base) { mapper_.add_odometry(stamp_s, T_odom_base); }
+
+  template <class Observation>
+  void add(const Observation& observation, const Pose2& T_base_sensor) {
+    ++frames_;
+    const LocalMapperResult& result = mapper_.update(observation, T_base_sensor);
+    if (!result.accepted) return;
+    ++accepted_;
+    if (odometry_.empty()) {
+      epoch_ = result.epoch;
+      T_map_local_ = result.T_local_base.inverse();
+    } else if (result.epoch != epoch_) {
+      epoch_ = result.epoch;
+      ++epochs_;
+      const Pose2 T_map_base =
+          trajectory_.back().T_map_robot * (odometry_.back().T_map_robot.inverse() * result.T_odom_base);
+      T_map_local_ = T_map_base * result.T_local_base.inverse();
+    }
+    const Pose2 T_map_base = T_map_local_ * result.T_local_base;
+    if (!trajectory_.empty()) path_m_ += distance_m(trajectory_.back().T_map_robot, T_map_base);
+    trajectory_.push_back({result.stamp_s, T_map_base});
+    odometry_.push_back({result.stamp_s, result.T_odom_base});
+  }
+
+  const LocalMapper& mapper() const { return mapper_; }
+  const Trajectory& trajectory() const { return trajectory_; }
+  const Trajectory& odometry() const { return odometry_; }
+  int frames() const { return frames_; }
+  int accepted() const { return accepted_; }
+  int epochs() const { return epochs_; }
+  double path_m() const { return path_m_; }
+
+ private:
+  LocalMapper mapper_;
+  Trajectory trajectory_, odometry_;
+  Pose2 T_map_local_;
+  std::uint32_t epoch_ = 0;
+  int frames_ = 0, accepted_ = 0, epochs_ = 1;
+  double path_m_ = 0.0;
+};
+
+void replay(const Options& options) {
+  auto mapper_config = read_config_section<LocalMapperConfig>(options.config, "local_mapper");
+  if (options.seed >= 0) mapper_config.seed = options.seed;
+  ObservationReaderConfig reader_config;
+  reader_config.source = options.from;
+  ObservationReader reader(options.bag, reader_config, read_front_end_config(options.config));
+  Recorder recorder(mapper_config);
+  Progress progress("replay (" + reader.source() + ")");
+
+  ObservationCallbacks callbacks;
+  callbacks.add_odometry = [&](double stamp_s, const Pose2& T) { recorder.add_odometry(stamp_s, T); };
+  callbacks.profile = [&](const DepthProfile& profile, const Pose2& T) { recorder.add(profile, T); };
+  callbacks.scan = [&](const RangeScan& scan, const Pose2& T) { recorder.add(scan, T); };
+  callbacks.progress = [&](double fraction) {
+    progress.update(fraction, fmt::format("{} frames, {:.1f} m", recorder.frames(), recorder.path_m()));
+  };
+  const auto start = std::chrono::steady_clock::now();
+  reader.read(callbacks);
+  const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  progress.update(1.0);
+  for (const std::string& warning : reader.warnings()) fmt::print(stderr, "replay: {}\n", warning);
+  if (recorder.trajectory().empty()) {
+    throw UserError(options.bag + ": no frame could be used: " + recorder.mapper().result().reason);
+  }
+
+  write_trajectory(options.trajectory, options.odometry_only ? recorder.odometry() : recorder.trajectory());
+  if (!options.map_out.empty()) write_local_map_pictures(options.map_out, recorder.mapper());
+  const double recording_s = reader.statistics().last_stamp_s - reader.statistics().first_stamp_s;
+  const nlohmann::json json = {{"source", reader.source()},
+                               {"frames", recorder.frames()},
+                               {"frames_accepted", recorder.accepted()},
+                               {"frames_rejected", reader.statistics().rejected},
+                               {"recording_s", recording_s},
+                               {"elapsed_s", elapsed_s},
+                               {"speed_ratio", elapsed_s > 0.0 ? recording_s / elapsed_s : 0.0},
+                               {"epochs", recorder.epochs()},
+                               {"path_m", recorder.path_m()},
+                               {"seed", mapper_config.seed}};
+  write_json(options.json, json.dump(2));
+  fmt::print(stderr, "{}: {} of {} frames, {:.1f} m, {} epoch{}, {:.0f} s of recording in {:.1f} s\n",
+             options.trajectory, recorder.accepted(), recorder.frames(), recorder.path_m(), recorder.epochs(),
+             recorder.epochs() == 1 ? "" : "s", recording_s, elapsed_s);
+}
+
+}  // namespace
+}  // namespace knav
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Runs a recording through the front end (if it has depth images and no profiles) and the local mapper, and\n"
+      "writes the robot's trajectory. The same bag, configuration and seed give the same bytes.");
+  knav::Options options;
+  app.add_option("BAG", options.bag, "recording with odometry and depth_profile, depth images or a LaserScan")->required();
+  app.add_option("--trajectory", options.trajectory, "TUM text to write: t x y z qx qy qz qw")->required();
+  app.add_option("--config", options.config, "configuration file, as config/default.yaml");
+  app.add_option("--seed", options.seed, "overrides local_mapper/seed")->check(CLI::NonNegativeNumber);
+  app.add_option("--from", options.from, "what to start from")
+      ->check(CLI::IsMember({"auto", "profile", "scan", "depth"}))
+      ->capture_default_str();
+  app.add_option("--map-out", options.map_out, "folder for local_map.png, tsdf.png and scan_360.png of the end");
+  app.add_option("--json", options.json, "write the figures to this file; '-' for standard output");
+  app.add_flag("--odometry", options.odometry_only, "write the odometry at the same stamps instead, to compare");
+  app.footer(knav::kJsonHelp);
+  return knav::run_command(app, argc, argv, [&] { knav::replay(options); });
+}
