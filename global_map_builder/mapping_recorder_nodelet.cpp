@@ -1,0 +1,125 @@
+// Records what build_map needs while the robot is driven around, with the first seconds of raw depth. As a nodelet
+// beside the camera it gets the images as pointers: 18 MB a second less to serialise than a recorder of its own.
+#include <pluginlib/class_list_macros.hpp>
+#include <ros/ros.h>
+#include <rosbag/bag.h>
+#include <sensor_msgs/Image.h>
+#include <topic_tools/shape_shifter.h>
+
+#include <cstdio>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "core/config.h"
+#include "ros_common/nodelet_base.h"
+#include "ros_common/parameters.h"
+
+namespace knav {
+namespace {
+
+struct MappingRecorderConfig {
+  std::string bag;
+  double depth_s = 20.0;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.text("bag", bag, "The recording to write; it appears under this name when the node ends.");
+    v.number("depth_s", depth_s, 0, 1e6, "s", "Raw depth is recorded for the first seconds; 18 MB each.");
+  }
+  std::vector<std::string> validate() const {
+    if (bag.empty()) return {"'bag' must name the file to write."};
+    return {};
+  }
+};
+
+}  // namespace
+
+class MappingRecorderNodelet : public NodeletBase {
+ public:
+  ~MappingRecorderNodelet() override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    close();
+  }
+
+ private:
+  void start() override {
+    config_ = read_parameters<MappingRecorderConfig>(getPrivateNodeHandle());
+    part_ = config_.bag + ".part";
+    try {
+      bag_.open(part_, rosbag::bagmode::Write);
+    } catch (const rosbag::BagException& error) {
+      throw UserError(config_.bag + ": cannot be written (" + error.what() + ").");
+    }
+    open_ = true;
+    for (const char* topic : {"depth_profile", "odom", "tf", "tf_static", "mark_place", "ground_truth", "joy",
+                              "camera/depth/camera_info"}) {
+      subscribe(topic);
+    }
+    if (config_.depth_s > 0.0) {
+      depth_subscriber_ = getNodeHandle().subscribe<sensor_msgs::Image>(
+          "camera/depth/image_raw", 60, [this](const sensor_msgs::ImageConstPtr& image) { add_depth(image); });
+    }
+    NODELET_INFO("Recording to %s.", config_.bag.c_str());
+  }
+
+  void subscribe(const std::string& topic) {
+    // tf is the root's whatever the namespace, as tf2 has it.
+    const std::string resolved =
+        topic == "tf" || topic == "tf_static" ? "/" + topic : getNodeHandle().resolveName(topic);
+    using Event = ros::MessageEvent<topic_tools::ShapeShifter const>;
+    subscribers_.push_back(getNodeHandle().subscribe<topic_tools::ShapeShifter>(
+        resolved, 1000, boost::function<void(const Event&)>([this, resolved](const Event& event) {
+          write(resolved, event.getReceiptTime(), *event.getConstMessage(), event.getConnectionHeaderPtr());
+        })));
+  }
+
+  void add_depth(const sensor_msgs::ImageConstPtr& image) {
+    if (first_depth_.isZero()) first_depth_ = image->header.stamp;
+    if ((image->header.stamp - first_depth_).toSec() > config_.depth_s) {
+      depth_subscriber_.shutdown();
+      return;
+    }
+    write(getNodeHandle().resolveName("camera/depth/image_raw"), image->header.stamp, *image, nullptr);
+  }
+
+  template <class Message>
+  void write(const std::string& topic, ros::Time time, const Message& message,
+             const boost::shared_ptr<ros::M_string>& connection_header) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    if (!open_ || time.isZero()) return;
+    try {
+      bag_.write(topic, time, message, connection_header);
+    } catch (const rosbag::BagException& error) {
+      NODELET_FATAL("Recording stopped: %s: %s. What was written is kept.", config_.bag.c_str(), error.what());
+      close();
+    }
+  }
+
+  void close() {
+    if (!open_) return;
+    open_ = false;
+    try {
+      bag_.close();
+      if (std::rename(part_.c_str(), config_.bag.c_str()) != 0) {
+        NODELET_ERROR("%s cannot be renamed to %s.", part_.c_str(), config_.bag.c_str());
+      }
+    } catch (const rosbag::BagException& error) {
+      NODELET_ERROR("%s: not closed: %s.", part_.c_str(), error.what());
+    }
+  }
+
+  MappingRecorderConfig config_;
+  std::mutex mutex_;
+  rosbag::Bag bag_;
+  bool open_ = false;
+  std::string part_;
+  ros::Time first_depth_;
+  ros::Subscriber depth_subscriber_;
+  std::vector<ros::Subscriber> subscribers_;
+};
+
+}  // namespace knav
+
+PLUGINLIB_EXPORT_CLASS(knav::MappingRecorderNodelet, nodelet::Nodelet)
