@@ -1,0 +1,223 @@
+#include "depth_profile_nodelet/floor_plane_fit.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "core/pose2.h"
+#include "kinect_calib/kinect_noise.h"
+#include "kinect_calib/multiversion.h"
+
+namespace knav {
+namespace {
+
+struct RowTerms {
+  float row_up, per_fx, cx, up_x, height, inverse_height, y;
+  float gate_m, gate_per_m, range_max_m;
+};
+
+/// Adds one row to the columns' sums. Residual r = 1/z - q, where q is the reference plane's inverse depth.
+KNAV_MULTIVERSION
+void add_row(const float* z_m, int width, const RowTerms& terms, float* n, float* y, float* yy, float* r,
+             float* yr, float* rr) {
+  const RowTerms t = terms;
+#pragma GCC ivdep
+  for (int u = 0; u < width; ++u) {
+    const float z = z_m[u];
+    const float up = t.up_x * ((static_cast<float>(u) - t.cx) * t.per_fx) + t.row_up;  // up . ray
+    const float height = z * up + t.height;
+    const float gate = t.gate_m + t.gate_per_m * z;
+    const bool in = (z > 0.0f) & (z <= t.range_max_m) & (height <= gate) & (height >= -gate);
+    const float weight = in ? 1.0f : 0.0f;
+    const float residual = in ? 1.0f / z + up * t.inverse_height : 0.0f;
+    n[u] += weight;
+    y[u] += weight * t.y;
+    yy[u] += weight * t.y * t.y;
+    r[u] += residual;
+    yr[u] += residual * t.y;
+    rr[u] += residual * residual;
+  }
+}
+
+/// Inverse depth is ray . g with g = -up / height.
+Eigen::Vector3d gradient_of(const FloorPlane& plane) { return -plane.up / plane.height_m; }
+
+FloorPlane plane_of(const Eigen::Vector3d& gradient) {
+  FloorPlane plane;
+  plane.height_m = 1.0 / gradient.norm();
+  plane.up = -gradient * plane.height_m;
+  return plane;
+}
+
+}  // namespace
+
+FloorPlane FloorPlane::from_mount(const Eigen::Isometry3d& T_base_optical) {
+  return {T_base_optical.linear().transpose() * Eigen::Vector3d::UnitZ(), T_base_optical.translation().z()};
+}
+
+void FloorPlaneFit::Sums::reset(int width) {
+  for (auto* sum : {&n, &y, &yy, &r, &yr, &rr}) sum->assign(static_cast<std::size_t>(width), 0.0f);
+}
+
+FloorPlaneFit::Result FloorPlaneFit::fit(const cv::Mat& depth, const PinholeModel& camera, double stamp_s,
+                                         const Eigen::Isometry3d& T_base_optical) {
+  Result result;
+  const FloorPlane mount = FloorPlane::from_mount(T_base_optical);
+  result.plane = mount;
+  if (config_.method == "mount" || mount.height_m <= 0.05) return result;
+  if (fit_frame(depth, camera, mount, &result)) {
+    result.source = FloorSource::kFrame;
+    previous_base_.up = T_base_optical.linear() * result.plane.up;
+    previous_base_.height_m = result.plane.height_m - previous_base_.up.dot(T_base_optical.translation());
+    previous_stamp_s_ = stamp_s;
+    has_previous_ = true;
+    return result;
+  }
+  const double age_s = stamp_s - previous_stamp_s_;
+  const bool fresh = config_.method == "paper" || (age_s >= 0.0 && age_s <= config_.previous_timeout_s);
+  if (has_previous_ && fresh) {
+    result.plane.up = T_base_optical.linear().transpose() * previous_base_.up;
+    result.plane.height_m = previous_base_.height_m + previous_base_.up.dot(T_base_optical.translation());
+    result.source = FloorSource::kPrevious;
+  } else {
+    result.plane = mount;
+    result.source = FloorSource::kMount;
+  }
+  return result;
+}
+
+bool FloorPlaneFit::fit_frame(const cv::Mat& depth, const PinholeModel& camera, const FloorPlane& mount,
+                              Result* result) {
+  const bool paper = config_.method == "paper";
+  const double tilt_per_m = std::tan(config_.tilt_tolerance_deg * kPi / 180.0);
+  accumulate(depth, camera, mount, config_.height_tolerance_m, tilt_per_m);
+  int heard = 0;
+  const int agreed = vote(camera, mount, &heard);
+  result->vote_fraction = heard > 0 ? static_cast<double>(agreed) / heard : 0.0;
+  if (agreed < config_.min_columns || result->vote_fraction < config_.majority) return false;
+  FloorPlane plane;
+  if (!solve(camera, mount, &plane)) return false;
+  if (!paper) {
+    // Once more with every reading near the plane found, and none that is not floor.
+    const double noise_per_m = config_.noise_codes * kInverseDepthPerCode;
+    accumulate(depth, camera, plane, 0.01, 3.0 * noise_per_m * plane.height_m);
+    FloorPlane refined;
+    if (!solve(camera, plane, &refined)) return false;
+    plane = refined;
+    const double cosine = std::clamp(plane.up.dot(mount.up), -1.0, 1.0);
+    if (std::acos(cosine) * 180.0 / kPi > config_.tilt_tolerance_deg) return false;
+    if (std::abs(plane.height_m - mount.height_m) > config_.height_tolerance_m) return false;
+  }
+  result->plane = plane;
+  return true;
+}
+
+void FloorPlaneFit::accumulate(const cv::Mat& depth, const PinholeModel& camera, const FloorPlane& reference,
+                               double gate_m, double gate_per_m) {
+  sums_.reset(depth.cols);
+  const bool paper = config_.method == "paper";
+  const double far_m = paper ? 20.0 : config_.range_max_m;
+  const double edge = std::max(camera.cx_px, camera.width_px - camera.cx_px) / camera.fx_px;
+  RowTerms terms{};
+  terms.per_fx = static_cast<float>(1.0 / camera.fx_px);
+  terms.cx = static_cast<float>(camera.cx_px);
+  terms.up_x = static_cast<float>(reference.up.x());
+  terms.height = static_cast<float>(paper ? 0.0 : reference.height_m);
+  terms.inverse_height = static_cast<float>(paper ? 0.0 : 1.0 / reference.height_m);
+  terms.gate_m = static_cast<float>(paper ? 1e9 : gate_m);
+  terms.gate_per_m = static_cast<float>(gate_per_m);
+  terms.range_max_m = static_cast<float>(far_m);
+  for (int v = 0; v < depth.rows; ++v) {
+    const double y = (v - camera.cy_px) / camera.fy_px;
+    const double up = reference.up.y() * y + reference.up.z();
+    if (paper) {
+      if (v < depth.rows - config_.paper_rows) continue;
+    } else if (up - std::abs(reference.up.x()) * edge > (gate_m - reference.height_m) / far_m + gate_per_m) {
+      continue;  // no candidate can lie in this row
+    }
+    terms.row_up = static_cast<float>(up);
+    terms.y = static_cast<float>(y);
+    add_row(depth.ptr<float>(v), depth.cols, terms, sums_.n.data(), sums_.y.data(), sums_.yy.data(),
+            sums_.r.data(), sums_.yr.data(), sums_.rr.data());
+  }
+}
+
+int FloorPlaneFit::vote(const PinholeModel& camera, const FloorPlane& reference, int* heard) {
+  const std::size_t width = sums_.n.size();
+  votes_.assign(width, 0);
+  const bool paper = config_.method == "paper";
+  const double noise_per_m = config_.noise_codes * kInverseDepthPerCode;
+  const int rows = paper ? std::max(config_.min_rows, config_.paper_rows / 2) : config_.min_rows;
+  // The inverse depth of a floor rises by 1 / height per unit of y; a wall's does not rise at all.
+  const double steepness = std::abs(gradient_of(reference).y());
+  const double slope_tolerance = steepness * (config_.height_tolerance_m / reference.height_m + 0.15);
+  int agreed = 0;
+  *heard = 0;
+  for (std::size_t u = 0; u < width; ++u) {
+    const double n = sums_.n[u];
+    if (n < rows) continue;
+    ++*heard;
+    const double mean_y = sums_.y[u] / n, mean_r = sums_.r[u] / n;
+    const double var_y = sums_.yy[u] / n - mean_y * mean_y;
+    const double cov = sums_.yr[u] / n - mean_y * mean_r;
+    if (var_y < 1e-9) continue;
+    const double slope = cov / var_y;
+    const double var_r = std::max(0.0, sums_.rr[u] / n - mean_r * mean_r - slope * cov);
+    if (std::sqrt(var_r) > noise_per_m) continue;
+    if (!paper && std::abs(slope) > slope_tolerance) continue;
+    votes_[u] = 1;
+    ++agreed;
+  }
+  if (paper) return agreed;
+  // The columns must agree with each other: those off the joint plane (a low platform's) are put out twice
+  // over.
+  for (int round = 0; round < 2 && agreed >= config_.min_columns; ++round) {
+    FloorPlane plane;
+    if (!solve(camera, reference, &plane)) return 0;
+    const Eigen::Vector3d change = gradient_of(plane) - gradient_of(reference);
+    agreed = 0;
+    for (std::size_t u = 0; u < width; ++u) {
+      if (votes_[u] == 0) continue;
+      const double n = sums_.n[u], x = (static_cast<double>(u) - camera.cx_px) / camera.fx_px;
+      const double expected = change.z() + change.y() * sums_.y[u] / n + change.x() * x;
+      if (std::abs(sums_.r[u] / n - expected) > noise_per_m * (round == 0 ? 3.0 : 2.0)) {
+        votes_[u] = 0;
+      } else {
+        ++agreed;
+      }
+    }
+  }
+  return agreed;
+}
+
+bool FloorPlaneFit::solve(const PinholeModel& camera, const FloorPlane& reference, FloorPlane* plane) const {
+  const bool paper = config_.method == "paper";
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();  // unknowns: changes of the gradient's x, y, z
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  for (std::size_t u = 0; u < sums_.n.size(); ++u) {
+    if (votes_[u] == 0) continue;
+    const double x = (static_cast<double>(u) - camera.cx_px) / camera.fx_px;
+    const double n = sums_.n[u], y = sums_.y[u], r = sums_.r[u];
+    A(0, 0) += n * x * x;
+    A(0, 1) += y * x;
+    A(0, 2) += n * x;
+    A(1, 1) += sums_.yy[u];
+    A(1, 2) += y;
+    A(2, 2) += n;
+    b += Eigen::Vector3d(x * r, sums_.yr[u], r);
+  }
+  A.triangularView<Eigen::StrictlyLower>() = A.transpose();
+  // Where few columns see floor, what they leave open stays with the mount.
+  const double prior = std::pow(kInverseDepthPerCode / 0.05, 2);
+  A.diagonal().array() += prior;
+  const Eigen::LDLT<Eigen::Matrix3d> solver(A);
+  if (solver.info() != Eigen::Success) return false;
+  const Eigen::Vector3d change = solver.solve(b);
+  const Eigen::Vector3d gradient =
+      (paper ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : gradient_of(reference)) + change;
+  if (!gradient.allFinite() || gradient.norm() < 1e-3) return false;
+  *plane = plane_of(gradient);
+  return true;
+}
+
+}  // namespace knav

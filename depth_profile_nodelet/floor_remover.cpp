@@ -1,0 +1,256 @@
+#include "depth_profile_nodelet/floor_remover.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "depth_profile_nodelet/profile_extractor.h"
+#include "kinect_calib/kinect_noise.h"
+#include "kinect_calib/multiversion.h"
+
+namespace knav {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+/// For one row: with x the normalised column of the source pixel, up . ray = up_x x + up_row, and the same
+/// for forward.
+struct RowTerms {
+  float up_x, up_row, forward_x, forward_row;
+  float height_m, bottom_m, bottom_per_m, top_m;
+};
+
+/// Levelled distance of what lies in the slice, else NaN.
+KNAV_MULTIVERSION
+void slice_row(const float* z_m, const float* x, int width, const RowTerms& terms, float* sliced_m) {
+  const RowTerms t = terms;
+  for (int u = 0; u < width; ++u) {
+    const float forward = z_m[u] * (t.forward_x * x[u] + t.forward_row);
+    const float height = z_m[u] * (t.up_x * x[u] + t.up_row) + t.height_m;
+    const bool keep =
+        (height > t.bottom_m + t.bottom_per_m * forward) & (height < t.top_m) & (forward > 0.0f);
+    sliced_m[u] = keep ? forward : kNaN;
+  }
+}
+
+struct FollowTerms {
+  float gap_m, gap_per_m;      ///< the floor may be interrupted this far, more with distance
+  float floor_range_m;         ///< rows that meet the floor farther off belong to the sweep
+  float below_m, below_per_m;  ///< readings this far under the floor are a drop
+};
+
+/// One step of following the floor up the columns, the lowest row first.
+KNAV_MULTIVERSION
+void follow_row(const float* z_m, const float* x, int width, const RowTerms& terms, const FollowTerms& follow,
+                float* free_from, float* free_to, float* alive, float* floor_rows, float* below_rows,
+                float* sweep_rows, float* sweep_seen) {
+  const RowTerms t = terms;
+  const FollowTerms f = follow;
+#pragma GCC ivdep
+  for (int u = 0; u < width; ++u) {
+    const float forward_ray = t.forward_x * x[u] + t.forward_row;
+    const float up_ray = t.up_x * x[u] + t.up_row;
+    const float forward = z_m[u] * forward_ray;
+    const float height = z_m[u] * up_ray + t.height_m;
+    const bool down = up_ray < -1e-4f;
+    const float expected =
+        t.height_m * forward_ray / (down ? -up_ray : 1e-4f);  // where this row meets the floor
+    const float low = t.bottom_m + t.bottom_per_m * forward;
+    const bool on_floor = down & (height <= low) & (height >= -low);
+    const bool started = free_to[u] > 0.0f;
+    const bool gap = started & !on_floor & (expected > free_to[u] * (1.0f + f.gap_per_m) + f.gap_m);
+    const float living = gap ? 0.0f : alive[u];
+    alive[u] = living;
+    const bool follows = on_floor & (living > 0.0f);
+    free_from[u] = follows & (expected < free_from[u]) ? expected : free_from[u];
+    free_to[u] = follows & (expected > free_to[u]) ? expected : free_to[u];
+    floor_rows[u] += follows ? 1.0f : 0.0f;
+    const bool below = (height < -(f.below_m + f.below_per_m * forward)) & (forward < 2.0f * f.floor_range_m);
+    below_rows[u] += below ? 1.0f : 0.0f;
+    const bool sweeps = down & (expected > f.floor_range_m);
+    sweep_rows[u] += sweeps ? 1.0f : 0.0f;
+    sweep_seen[u] += sweeps & (z_m[u] > 0.0f) ? 1.0f : 0.0f;
+  }
+}
+
+struct ClassTerms {
+  float slope, slope_per_px, height_m;  ///< height above the floor = slope of the ray x distance + height_m
+  float low_edge_m, high_edge_m;
+};
+
+/// Counts what each column's nearest obstacle shows below, within and above the band that stays in view.
+KNAV_MULTIVERSION
+void class_row(const float* sliced_m, int width, const ClassTerms& terms, const float* from_m,
+               const float* to_m, float* low, float* middle, float* high) {
+  const ClassTerms t = terms;
+#pragma GCC ivdep
+  for (int u = 0; u < width; ++u) {
+    const float z = sliced_m[u];
+    const bool in = (z >= from_m[u]) & (z <= to_m[u]);
+    const float height = z * (t.slope + t.slope_per_px * static_cast<float>(u)) + t.height_m;
+    low[u] += in & (height < t.low_edge_m) ? 1.0f : 0.0f;
+    middle[u] += in & (height >= t.low_edge_m) & (height <= t.high_edge_m) ? 1.0f : 0.0f;
+    high[u] += in & (height > t.high_edge_m) ? 1.0f : 0.0f;
+  }
+}
+
+/// The levelled camera: forward and right parallel to the floor.
+struct Level {
+  Eigen::Vector3d forward, right, up;
+  bool valid;
+};
+Level level_of(const FloorPlane& plane) {
+  Level level;
+  level.up = plane.up;
+  const Eigen::Vector3d along = Eigen::Vector3d::UnitZ() - plane.up * plane.up.z();
+  level.valid = along.norm() > 0.2;  // else it looks straight down or up and has no forward
+  level.forward = along.normalized();
+  level.right = level.forward.cross(level.up);
+  return level;
+}
+
+}  // namespace
+
+void FloorRemover::Columns::reset(int width) {
+  const auto size = static_cast<std::size_t>(width);
+  free_from_m.assign(size, std::numeric_limits<float>::infinity());
+  free_to_m.assign(size, 0.0f);
+  alive.assign(size, 1.0f);
+  for (auto* counts : {&floor_rows, &below_rows, &sweep_rows, &sweep_seen}) counts->assign(size, 0.0f);
+}
+
+FloorRemover::FloorRemover(const FloorRemovalConfig& config) : config_(config), fit_(config.fit) {
+  const DepthProfileConfig profile;
+  surface_.configure(profile.support_rows, profile.window_codes * kInverseDepthPerCode, profile.range_max_m);
+}
+
+void FloorRemover::process(const cv::Mat& depth, const PinholeModel& camera, double stamp_s,
+                           const Eigen::Isometry3d& T_base_optical, cv::Mat* sliced, FloorResult* result) {
+  const FloorPlaneFit::Result fitted = fit_.fit(depth, camera, stamp_s, T_base_optical);
+  result->plane = fitted.plane;
+  result->source = fitted.source;
+  result->vote_fraction = fitted.vote_fraction;
+  sliced->create(depth.rows, depth.cols, CV_32FC1);
+  columns_.reset(depth.cols);
+  slice_rows(depth, camera, fitted.plane, sliced);
+  conclude(camera, fitted.plane, *sliced, result);
+}
+
+void FloorRemover::slice_rows(const cv::Mat& depth, const PinholeModel& camera, const FloorPlane& plane,
+                              cv::Mat* sliced) {
+  const Level level = level_of(plane);
+  if (!level.valid) {
+    sliced->setTo(kNaN);
+    return;
+  }
+  row_z_m_.resize(static_cast<std::size_t>(depth.cols));
+  FollowTerms follow{};
+  follow.gap_m = 0.15f;
+  follow.gap_per_m = 0.15f;
+  follow.floor_range_m = static_cast<float>(config_.floor_range_m);
+  follow.below_m = static_cast<float>(0.05 + 2.0 * config_.slice_bottom_m);
+  follow.below_per_m = static_cast<float>(3.0 * config_.slice_bottom_per_m);
+  for (int v = depth.rows - 1; v >= 0; --v) {
+    const double y = (v - camera.cy_px) / camera.fy_px;
+    const auto along_row = [&](const Eigen::Vector3d& axis) { return axis.y() * y + axis.z(); };
+    const double forward_row = along_row(level.forward), right_row = along_row(level.right);
+    // Levelled column x' = right . ray / forward . ray, solved for the source column x.
+    const bool moves = warp_.set({forward_row, -right_row, -level.forward.x(), level.right.x()}, camera.fx_px,
+                                 camera.cx_px, depth.cols);
+    const float* z_m = depth.ptr<float>(v);
+    if (moves) {
+      warp_.take(z_m, row_z_m_.data());
+      z_m = row_z_m_.data();
+    }
+    RowTerms terms{};
+    terms.up_x = static_cast<float>(level.up.x());
+    terms.up_row = static_cast<float>(along_row(level.up));
+    terms.forward_x = static_cast<float>(level.forward.x());
+    terms.forward_row = static_cast<float>(forward_row);
+    terms.height_m = static_cast<float>(plane.height_m);
+    terms.bottom_m = static_cast<float>(config_.slice_bottom_m);
+    terms.bottom_per_m = static_cast<float>(config_.slice_bottom_per_m);
+    terms.top_m = static_cast<float>(config_.slice_top_m);
+    const float* x = warp_.source_x().data();
+    slice_row(z_m, x, depth.cols, terms, sliced->ptr<float>(v));
+    const float steepest =
+        terms.up_row - std::abs(terms.up_x) * std::max(std::abs(x[0]), std::abs(x[depth.cols - 1]));
+    if (steepest < 0.0f) {
+      follow_row(z_m, x, depth.cols, terms, follow, columns_.free_from_m.data(), columns_.free_to_m.data(),
+                 columns_.alive.data(), columns_.floor_rows.data(), columns_.below_rows.data(),
+                 columns_.sweep_rows.data(), columns_.sweep_seen.data());
+    }
+  }
+}
+
+void FloorRemover::conclude(const PinholeModel& camera, const FloorPlane& plane, const cv::Mat& sliced,
+                            FloorResult* result) {
+  const auto width = static_cast<std::size_t>(sliced.cols);
+  result->free_from_m.assign(width, kNaN);
+  result->free_to_m.assign(width, kNaN);
+  result->height_class.assign(width, HeightClass::kNone);
+  surface_.find(sliced);
+  classify(camera, plane, sliced);
+  const std::vector<float>& nearest_m = surface_.nearest_m();
+  const auto floor_range_m = static_cast<float>(config_.floor_range_m);
+  for (std::size_t u = 0; u < width; ++u) {
+    const float z = nearest_m[u];
+    const bool surface = !std::isnan(z);
+    if (surface) {
+      result->height_class[u] = middle_seen_[u] >= 2.0f ? HeightClass::kMiddle
+                                : low_seen_[u] > 0.0f   ? HeightClass::kLow
+                                                        : HeightClass::kHigh;
+    }
+    const bool drop = columns_.below_rows[u] >= 3.0f;
+    float from = columns_.free_from_m[u], to = columns_.free_to_m[u];
+    const bool swept =
+        columns_.sweep_rows[u] > 0.0f && columns_.sweep_seen[u] >= 0.5f * columns_.sweep_rows[u];
+    if (columns_.floor_rows[u] >= 3.0f) {
+      if (surface) {
+        const bool reached = to >= std::min(0.95f * floor_range_m, 0.9f * z - 0.2f);
+        to = reached && (z <= floor_range_m || swept) && !drop ? z : std::min(to, z);
+      }
+    } else if (config_.free_without_floor && surface && !drop) {
+      from = static_cast<float>(config_.view_near_m);
+      to = z;
+    } else {
+      continue;
+    }
+    if (from < to) {
+      result->free_from_m[u] = from;
+      result->free_to_m[u] = to;
+    }
+  }
+}
+
+void FloorRemover::classify(const PinholeModel& camera, const FloorPlane& plane, const cv::Mat& sliced) {
+  const auto width = static_cast<std::size_t>(sliced.cols);
+  low_seen_.assign(width, 0.0f);
+  middle_seen_.assign(width, 0.0f);
+  high_seen_.assign(width, 0.0f);
+  const Level level = level_of(plane);
+  if (!level.valid) return;
+  // How steeply the levelled column u' looks up in row v: up . ray / forward . ray of its source pixel.
+  const auto slope = [&](double u_levelled, double v) {
+    const double y = (v - camera.cy_px) / camera.fy_px,
+                 x_levelled = (u_levelled - camera.cx_px) / camera.fx_px;
+    const auto along_row = [&](const Eigen::Vector3d& axis) { return axis.y() * y + axis.z(); };
+    const double x = (x_levelled * along_row(level.forward) - along_row(level.right)) /
+                     (level.right.x() - x_levelled * level.forward.x());
+    return (level.up.x() * x + along_row(level.up)) / (level.forward.x() * x + along_row(level.forward));
+  };
+  ClassTerms terms{};
+  terms.height_m = static_cast<float>(plane.height_m);
+  terms.low_edge_m =
+      static_cast<float>(plane.height_m + config_.view_near_m * slope(camera.cx_px, sliced.rows - 1));
+  terms.high_edge_m = static_cast<float>(plane.height_m + config_.view_near_m * slope(camera.cx_px, 0));
+  for (int v = 0; v < sliced.rows; ++v) {
+    const double left = slope(0, v), right = slope(sliced.cols - 1, v);
+    terms.slope = static_cast<float>(left);
+    terms.slope_per_px = static_cast<float>((right - left) / std::max(1, sliced.cols - 1));
+    class_row(sliced.ptr<float>(v), sliced.cols, terms, surface_.nearest_m().data(),
+              surface_.window_end_m().data(), low_seen_.data(), middle_seen_.data(), high_seen_.data());
+  }
+}
+
+}  // namespace knav
