@@ -35,7 +35,7 @@ MapDirectory load_map(const std::string& path);
 
 /// Writes all files beside `directory`, then renames: readers see the old map or the whole new one. An existing map
 /// is replaced, but a directory that holds anything else is refused (UserError), and so is, unless `force`, a map
-/// whose keepout.pgm or places.yaml were edited by hand. An existing distance.checksum is ignored.
+/// whose keepout.pgm or places.yaml were edited by hand.
 /// @param more  writes further files into the directory it is given, before the rename; may be empty
 /// @return the checksum
 std::string save_map(const std::string& directory, const MapDirectory& map, bool force = false,
@@ -48,7 +48,7 @@ std::string map_checksum(const OccupancyGrid& occupancy, const DistanceMap& dist
 /// occupied cells, NaN in unknown ones. For maps that carry no contour.
 DistanceMap distance_from_occupancy(const OccupancyGrid& occupancy);
 
-/// For named map files: true if `path` is a map directory (has a map.yaml).
+/// True if `path` is a map directory (has a map.yaml).
 bool is_map_directory(const std::string& path);
 
 }  // namespace knav
