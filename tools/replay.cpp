@@ -7,6 +7,7 @@
 
 #include "core/config.h"
 #include "core/error.h"
+#include "core/file_io.h"
 #include "core/progress.h"
 #include "core/trajectory.h"
 #include "depth_profile_nodelet/front_end.h"
@@ -19,7 +20,7 @@ namespace knav {
 namespace {
 
 struct Options {
-  std::string bag, trajectory, config, map_out, json;
+  std::string bag, trajectory, config, map_out, json, profiles;
   std::string from = "auto";
   int seed = -1;
   bool odometry_only = false;
@@ -29,14 +30,6 @@ const char* const kJsonHelp =
     R"(The JSON holds source, frames, frames_accepted, frames_rejected (counts), recording_s, elapsed_s,
 speed_ratio (recording_s / elapsed_s), epochs (count), path_m (length of the estimate), seed.)";
 
-FrontEndConfig read_front_end_config(const std::string& path) {
-  FrontEndConfig config;
-  config.depth_correction = read_config_section<decltype(config.depth_correction)>(path, "depth_correction");
-  config.rolling_shutter = read_config_section<decltype(config.rolling_shutter)>(path, "rolling_shutter");
-  config.floor_removal = read_config_section<decltype(config.floor_removal)>(path, "floor_removal");
-  config.depth_profile = read_config_section<decltype(config.depth_profile)>(path, "depth_profile");
-  return config;
-}
 
 /// Gathers what the mapper says of each frame. Across epochs the trajectory goes on by odometry.
 class Recorder {
@@ -89,13 +82,19 @@ void replay(const Options& options) {
   if (options.seed >= 0) mapper_config.seed = options.seed;
   ObservationReaderConfig reader_config;
   reader_config.source = options.from;
-  ObservationReader reader(options.bag, reader_config, read_front_end_config(options.config));
+  ObservationReader reader(options.bag, reader_config, FrontEndConfig::from_file(options.config));
   Recorder recorder(mapper_config);
   Progress progress("replay (" + reader.source() + ")");
 
   ObservationCallbacks callbacks;
   callbacks.add_odometry = [&](double stamp_s, const Pose2& T) { recorder.add_odometry(stamp_s, T); };
-  callbacks.profile = [&](const DepthProfile& profile, const Pose2& T) { recorder.add(profile, T); };
+  std::string profiles_csv;
+  callbacks.profile = [&](const DepthProfile& profile, const Pose2& T) {
+    if (!options.profiles.empty()) {
+      profiles_csv += fmt::format("{:.6f},{:.4f}\n", profile.stamp_s, fmt::join(profile.z_m, ","));
+    }
+    recorder.add(profile, T);
+  };
   callbacks.scan = [&](const RangeScan& scan, const Pose2& T) { recorder.add(scan, T); };
   callbacks.progress = [&](double fraction) {
     progress.update(fraction, fmt::format("{} frames, {:.1f} m", recorder.frames(), recorder.path_m()));
@@ -110,6 +109,7 @@ void replay(const Options& options) {
   }
 
   write_trajectory(options.trajectory, options.odometry_only ? recorder.odometry() : recorder.trajectory());
+  if (!options.profiles.empty()) write_text_atomically(options.profiles, profiles_csv);
   if (!options.map_out.empty()) write_local_map_pictures(options.map_out, recorder.mapper());
   const double recording_s = reader.statistics().last_stamp_s - reader.statistics().first_stamp_s;
   const nlohmann::json json = {{"source", reader.source()},
@@ -144,6 +144,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"auto", "profile", "scan", "depth"}))
       ->capture_default_str();
   app.add_option("--map-out", options.map_out, "folder for local_map.png, tsdf.png and scan_360.png of the end");
+  app.add_option("--profiles", options.profiles, "write every depth profile as CSV: stamp [s], then z [m] per column");
   app.add_option("--json", options.json, "write the figures to this file; '-' for standard output");
   app.add_flag("--odometry", options.odometry_only, "write the odometry at the same stamps instead, to compare");
   app.footer(knav::kJsonHelp);
