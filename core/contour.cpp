@@ -1,0 +1,200 @@
+#include "core/contour.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace knav {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+/// Visits the cells on a ray in order (Amanatides and Woo). Quad (ix, iy) spans four cell centres, and the dual
+/// grid of these quads is walked, so that F is continuous along the ray and one word serves each step.
+class QuadWalk {
+ public:
+  QuadWalk(double x, double y, double dir_x, double dir_y) {  // in cells, quads' corners at integers
+    ix = static_cast<int>(std::floor(x));
+    iy = static_cast<int>(std::floor(y));
+    step_x_ = dir_x > 0.0 ? 1 : -1;
+    step_y_ = dir_y > 0.0 ? 1 : -1;
+    const double huge = 1e30;
+    delta_x_ = std::fabs(dir_x) > 1e-12 ? 1.0 / std::fabs(dir_x) : huge;
+    delta_y_ = std::fabs(dir_y) > 1e-12 ? 1.0 / std::fabs(dir_y) : huge;
+    next_x_ = delta_x_ < huge ? (dir_x > 0.0 ? ix + 1 - x : x - ix) * delta_x_ : huge;
+    next_y_ = delta_y_ < huge ? (dir_y > 0.0 ? iy + 1 - y : y - iy) * delta_y_ : huge;
+  }
+  double leaves_at() const { return std::min(next_x_, next_y_); }
+  void step() {
+    if (next_x_ < next_y_) {
+      ix += step_x_;
+      next_x_ += delta_x_;
+    } else {
+      iy += step_y_;
+      next_y_ += delta_y_;
+    }
+  }
+  int ix, iy;
+
+ private:
+  int step_x_, step_y_;
+  double delta_x_, delta_y_, next_x_, next_y_;
+};
+
+/// F * 127 at a point of a quad between its known corners; NaN if none is known.
+float value_in(std::uint32_t quad, float tx, float ty) {
+  const float share[4] = {(1 - tx) * (1 - ty), tx * (1 - ty), (1 - tx) * ty, tx * ty};
+  float sum = 0.0f, known = 0.0f;
+  for (int corner = 0; corner < 4; ++corner) {
+    const auto byte = static_cast<std::int8_t>((quad >> (8 * corner)) & 0xFFu);
+    if (byte == TsdfGrid::kUnknown) continue;
+    const float w = share[corner] + 1e-6f;
+    sum += w * static_cast<float>(byte);
+    known += w;
+  }
+  return known > 0.0f ? sum / known : kNaN;
+}
+
+constexpr std::uint32_t kAllFree = 0x7F7F7F7Fu, kAllUnknown = 0x80808080u;
+
+float newest_seen(const TsdfGrid& grid, int ix, int iy) {
+  float seen = 0.0f;
+  for (int dy = 0; dy < 2; ++dy) {
+    for (int dx = 0; dx < 2; ++dx) seen = std::max(seen, grid.last_seen_s(ix + dx, iy + dy));
+  }
+  return seen;
+}
+
+}  // namespace
+
+RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, double y_m, double dir_x,
+                double dir_y, double length_m) {
+  const double scale = 1.0 / grid.resolution_m();
+  const double x = x_m * scale - 0.5, y = y_m * scale - 0.5;  // quad corners (cell centres) at integers
+  const double length = length_m * scale;
+  const double blind = config.blind_radius_m * scale, gap = config.unknown_gap_m * scale;
+  const std::uint32_t* const quads = grid.quads();
+  QuadWalk walk(x, y, dir_x, dir_y);
+  double entered = 0.0;       // where the ray entered the present quad
+  double unknown_from = 0.0;  // where the present stretch of unknown began
+  double positive_at = -1.0;  // the last place where F was known and positive, without unknown since
+  float positive_value = 0.0f;
+  float oldest_free = kInf;
+  RayEnd end;
+  while (entered < length) {
+    if (!grid.contains(walk.ix, walk.iy) || !grid.contains(walk.ix + 1, walk.iy + 1)) break;
+    const double leaves = std::min(walk.leaves_at(), length);
+    const std::uint32_t quad = quads[grid.index(walk.ix, walk.iy)];
+    if (quad == kAllFree) {
+      positive_at = leaves;
+      positive_value = TsdfGrid::kValueScale;
+      unknown_from = leaves;
+    } else if (quad == kAllUnknown) {
+      positive_at = -1.0;  // positive next to unknown is no surface
+      if (leaves - std::max(unknown_from, blind) > gap) break;
+    } else {
+      // The middle and the far edge of the ray's way through the quad.
+      for (const double t : {0.5 * (entered + leaves), leaves}) {
+        const auto tx = static_cast<float>(x + t * dir_x - walk.ix), ty = static_cast<float>(y + t * dir_y - walk.iy);
+        const float value = value_in(quad, tx, ty);
+        if (value > 0.0f) {
+          positive_at = t;
+          positive_value = value;
+        } else {
+          if (positive_at >= 0.0) {
+            const double back = (t - positive_at) * static_cast<double>(-value / (positive_value - value));
+            end.kind = RayEnd::Kind::kSurface;
+            end.range_m = static_cast<float>((t - back) * grid.resolution_m());
+            end.last_seen_s = newest_seen(grid, walk.ix, walk.iy);
+            return end;
+          }
+          positive_at = -1.0;  // behind a surface that the ray did not cross from its front
+        }
+      }
+      unknown_from = leaves;
+    }
+    if (unknown_from == leaves) oldest_free = std::min(oldest_free, grid.last_seen_s(walk.ix, walk.iy));
+    entered = leaves;
+    if (entered >= length) {
+      if (positive_at >= 0.0) end.kind = RayEnd::Kind::kFree;
+      break;
+    }
+    walk.step();
+  }
+  end.range_m = static_cast<float>(entered * grid.resolution_m());
+  end.last_seen_s = oldest_free < kInf ? oldest_free : 0.0f;
+  return end;
+}
+
+void extract_contour(const TsdfGrid& grid, const ContourConfig& config, const Pose2& T, float now_age_clock_s,
+                     RangeScan* scan) {
+  const auto rays = static_cast<std::size_t>(config.rays);
+  scan->angle_min_rad = -kPi;
+  scan->angle_increment_rad = 2.0 * kPi / config.rays;
+  scan->range_min_m = 0.0;
+  scan->range_max_m = config.range_max_m;
+  scan->range_m.resize(rays);
+  scan->evidence.resize(rays);
+  for (std::size_t i = 0; i < rays; ++i) {
+    const double angle = T.yaw_rad + scan->angle_min_rad + static_cast<double>(i) * scan->angle_increment_rad;
+    const RayEnd end =
+        cast_ray(grid, config, T.x_m, T.y_m, std::cos(angle), std::sin(angle), config.range_max_m);
+    const bool unknown = end.kind == RayEnd::Kind::kUnknown;
+    scan->range_m[i] = unknown ? kNaN : end.kind == RayEnd::Kind::kFree ? kInf : end.range_m;
+    const float age_s = std::max(0.0f, now_age_clock_s - end.last_seen_s);
+    scan->evidence[i] = unknown ? 0.0f : std::exp(-age_s / static_cast<float>(config.evidence_decay_s));
+  }
+}
+
+void merge_newest(const TsdfObservation& o, const Pose2& T_map_robot, RangeScan* scan) {
+  const Pose2 T_robot_sensor = T_map_robot.inverse() * o.T_map_sensor;
+  const double c = std::cos(T_robot_sensor.yaw_rad), s = std::sin(T_robot_sensor.yaw_rad);
+  const auto rays = static_cast<std::ptrdiff_t>(scan->range_m.size());
+  const double increment = scan->angle_increment_rad;
+  static thread_local std::vector<float> newest;
+  newest.assign(scan->range_m.size(), kInf);
+  const auto put = [&](std::ptrdiff_t ray, double range) {
+    float& value = newest[static_cast<std::size_t>(((ray % rays) + rays) % rays)];
+    value = std::min(value, static_cast<float>(range));
+  };
+  bool have_last = false;
+  double last_x = 0.0, last_y = 0.0, last_range = 0.0;
+  for (std::size_t i = 0; i < o.columns(); ++i) {
+    if (std::isnan(o.range_m[i])) {
+      have_last = false;
+      continue;
+    }
+    const double px = static_cast<double>(o.direction_x[i] * o.range_m[i]);
+    const double py = static_cast<double>(o.direction_y[i] * o.range_m[i]);
+    const double x = T_robot_sensor.x_m + c * px - s * py, y = T_robot_sensor.y_m + s * px + c * py;
+    const double angle = std::atan2(y, x), range = std::hypot(x, y);
+    put(static_cast<std::ptrdiff_t>(std::lround((angle - scan->angle_min_rad) / increment)), range);
+    const double gap = std::hypot(x - last_x, y - last_y);
+    if (have_last && gap < 0.1 + 0.05 * std::min(range, last_range)) {
+      // One surface: every ray between the two columns meets the line between their points.
+      const double last_angle = std::atan2(last_y, last_x);
+      const double turn = normalize_angle_rad(angle - last_angle);
+      const double from = (turn > 0 ? last_angle : angle) - scan->angle_min_rad;
+      const auto first = static_cast<std::ptrdiff_t>(std::ceil(from / increment));
+      const auto last = static_cast<std::ptrdiff_t>(std::floor((from + std::fabs(turn)) / increment));
+      const double nx = -(y - last_y), ny = x - last_x, offset = nx * x + ny * y;
+      for (std::ptrdiff_t ray = first; ray <= last; ++ray) {
+        const double a = scan->angle_min_rad + static_cast<double>(ray) * increment;
+        const double along = nx * std::cos(a) + ny * std::sin(a);
+        if (std::fabs(along) > 1e-9) put(ray, offset / along);
+      }
+    }
+    have_last = true;
+    last_x = x;
+    last_y = y;
+    last_range = range;
+  }
+  for (std::size_t i = 0; i < newest.size(); ++i) {
+    if (!(newest[i] < kInf) || newest[i] > scan->range_max_m) continue;
+    scan->range_m[i] = newest[i];
+    scan->evidence[i] = 1.0f;
+  }
+}
+
+}  // namespace knav

@@ -1,0 +1,133 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/grid_geometry.h"
+#include "core/tsdf_observation.h"
+
+namespace knav {
+
+struct TsdfConfig {
+  double resolution_m = 0.05;
+  TruncationConfig truncation;
+  double weight_range_floor_m = 0.5;
+  int weight_bits = 16;
+  double clear_margin_m = 0.1;
+  int contradictions_to_reset = 4;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.number("resolution_m", resolution_m, 0.01, 0.5, "m", "Side of a cell.");
+    v.group("truncation", truncation, "The width of a surface's support, which grows with range.");
+    v.number("weight_range_floor_m", weight_range_floor_m, 0.1, 5, "m",
+             "A reading's weight is 1 / max(distance, this)^2 (equation 4).");
+    v.integer("weight_bits", weight_bits, 8, 20, "bit", "Weights are integers: 2^this is weight 1.");
+    v.number("clear_margin_m", clear_margin_m, 0, 1, "m",
+             "A surface is contradicted where rays pass it freely within this distance on both sides.");
+    v.integer("contradictions_to_reset", contradictions_to_reset, 1, 255, "frames",
+              "A cell that this many frames contradict forgets what it held.");
+  }
+  std::vector<std::string> validate() const { return {}; }
+  /// The largest weight one observation adds to a cell, in integer units.
+  double largest_weight() const;
+  /// How many observations the 32-bit sums can hold at once, whatever they see.
+  double observation_capacity() const { return 2147483647.0 / largest_weight(); }
+};
+
+/// The projective truncated signed distance map of paper section III.D, as a torus that scrolls with the robot.
+///
+/// Each cell holds the integer sums of w f and of w, so that taking an observation away (equations 8, 9) is exact
+/// to the bit whatever the order. A cell also remembers since which observation it counts: scrolling a cell in, or
+/// clear free evidence against its surface, resets it, and removing an older observation then skips it. Hence a
+/// cell always holds exactly the sum of the held observations that are not older than its reset.
+///
+/// Cells are addressed by absolute integers: cell (ix, iy) has its centre at ((ix + 0.5) res, (iy + 0.5) res).
+class TsdfGrid {
+ public:
+  static constexpr std::int8_t kUnknown = -128;
+  static constexpr float kValueScale = 127.0f;
+
+  /// @param half_size_m the window reaches at least this far from its centre (sizes round up to powers of two)
+  TsdfGrid(const TsdfConfig& config, double half_size_m);
+
+  /// Everything becomes unknown.
+  void clear();
+  /// Moves the window so that the point lies within a scroll step of its centre. Cells that enter are unknown.
+  /// @param next_sequence that of the next observation to be added
+  void scroll_to(double x_m, double y_m, std::uint32_t next_sequence);
+
+  /// Equations 2-6. The observation's sequence must be larger than any before it.
+  void add(const TsdfObservation& observation);
+  /// Equations 8, 9. The observation must have been added, and not been removed, since the last clear().
+  void remove(const TsdfObservation& observation);
+
+  double resolution_m() const { return config_.resolution_m; }
+  int size_cells() const { return size_; }
+  /// Absolute index of the lower left cell of the window.
+  int first_x() const { return first_x_; }
+  int first_y() const { return first_y_; }
+  int cell_of(double coordinate_m) const;
+  double center_m(int i) const { return (i + 0.5) * config_.resolution_m; }
+  bool contains(int ix, int iy) const {
+    return ix >= first_x_ && iy >= first_y_ && ix < first_x_ + size_ && iy < first_y_ + size_;
+  }
+  std::size_t index(int ix, int iy) const {
+    return (static_cast<std::size_t>(iy & mask_) << bits_) | static_cast<std::size_t>(ix & mask_);
+  }
+  int bits() const { return bits_; }
+
+  // By absolute cell; the cell must lie in the window.
+  bool known(int ix, int iy) const { return weight_[index(ix, iy)] > 0; }
+  /// F in [-1, 1], NaN where W = 0.
+  float distance(int ix, int iy) const;
+  /// W in the paper's unit, 1 / m^2.
+  float weight(int ix, int iy) const;
+  std::int32_t weighted_sum_units(int ix, int iy) const { return weighted_sum_[index(ix, iy)]; }
+  std::int32_t weight_units(int ix, int iy) const { return weight_[index(ix, iy)]; }
+  std::uint32_t reset_sequence(int ix, int iy) const { return reset_[index(ix, iy)]; }
+  /// The window's clock when the cell was last touched.
+  float last_seen_s(int ix, int iy) const { return last_seen_s_[index(ix, iy)]; }
+
+  /// F of the four cells whose centres surround a point, as signed bytes (kUnknown where W = 0), packed in one word
+  /// per lower left cell: bits 0-7 (x, y), 8-15 (x + 1, y), 16-23 (x, y + 1), 24-31 (x + 1, y + 1). One random read
+  /// gives all that bilinear interpolation needs.
+  const std::uint32_t* quads() const { return quad_.data(); }
+  std::int8_t value(int ix, int iy) const {
+    return static_cast<std::int8_t>(quad_[index(ix, iy)] & 0xFFu);
+  }
+  float weight_unit() const { return weight_unit_; }
+  const std::int32_t* weighted_sums() const { return weighted_sum_.data(); }
+  const std::int32_t* weights() const { return weight_.data(); }
+
+  std::uint64_t cells_reset_by_contradiction() const { return contradicted_; }
+
+ private:
+  template <bool kAdd>
+  void apply(const TsdfObservation& observation);
+  template <bool kAdd>
+  void apply_row(const TsdfObservation& observation, int iy, int from_x, int to_x);
+  void set_value(int ix, int iy, std::int8_t value);
+  void refresh(int ix, int iy, std::size_t i);
+  void reset_cell(int ix, int iy, std::uint32_t next_sequence);
+
+  TsdfConfig config_;
+  int bits_ = 0, size_ = 0, mask_ = 0;
+  int first_x_ = 0, first_y_ = 0;
+  float weight_unit_ = 0.0f;
+  std::vector<std::int32_t> weighted_sum_, weight_;
+  std::vector<std::uint32_t> reset_;
+  std::vector<float> last_seen_s_;
+  std::vector<std::uint32_t> quad_;
+  std::vector<std::uint8_t> contradictions_;
+  std::vector<std::int32_t> row_column_;  ///< scratch of one row: the observation's column of each cell, or -1
+  std::vector<float> row_distance_m_;     ///< ... and its distance from the sensor
+  std::uint64_t contradicted_ = 0;
+};
+
+/// F bilinearly between the known cells round a point, in [-1, 1]; returns the weight [0, 1] of the known ones, 0
+/// (and *value untouched) if all are unknown or the point is outside the window.
+float interpolate(const TsdfGrid& grid, double x_m, double y_m, float* value);
+
+}  // namespace knav

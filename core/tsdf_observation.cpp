@@ -1,0 +1,140 @@
+#include "core/tsdf_observation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace knav {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+void resize(std::size_t columns, TsdfObservation* out) {
+  for (std::vector<float>* field : {&out->direction_x, &out->direction_y, &out->range_m, &out->truncation_m,
+                                    &out->free_from_m, &out->free_to_m, &out->clear_from_m, &out->clear_to_m}) {
+    field->resize(columns);
+  }
+}
+
+bool answered(const TsdfObservation& o, std::size_t i) {
+  return !std::isnan(o.range_m[i]) || o.free_to_m[i] >= o.free_from_m[i];
+}
+
+/// How far a column's answer reaches.
+float seen_to(const TsdfObservation& o, std::size_t i) {
+  return std::isnan(o.range_m[i]) ? std::max(o.free_to_m[i], 0.0f) : o.range_m[i];
+}
+
+float sine_between(const TsdfObservation& o, std::size_t i, std::size_t k) {
+  return std::fabs(o.direction_x[i] * o.direction_y[k] - o.direction_y[i] * o.direction_x[k]);
+}
+
+/// The tube of +-margin round each ray. A neighbour's answer at range r ends all tubes that it lies in. Beside a
+/// column without any answer nothing is sure until the rays are a margin apart, so that a dark pole between good
+/// columns is not carved away.
+void set_clear(const ObservationLimits& limits, TsdfObservation* out) {
+  const std::size_t n = out->columns();
+  const auto margin = static_cast<float>(limits.clear_margin_m);
+  for (std::size_t i = 0; i < n; ++i) {
+    out->clear_from_m[i] = 0.0f;
+    out->clear_to_m[i] = seen_to(*out, i);
+  }
+  const auto pass = [&](std::ptrdiff_t first, std::ptrdiff_t step) {
+    std::ptrdiff_t blind = -1;  // the last column without an answer
+    const auto count = static_cast<std::ptrdiff_t>(n);
+    for (std::ptrdiff_t p = first; p >= 0 && p < count; p += step) {
+      const auto i = static_cast<std::size_t>(p);
+      if (!answered(*out, i)) {
+        blind = p;
+        continue;
+      }
+      if (blind >= 0) {
+        const float sine = sine_between(*out, i, static_cast<std::size_t>(blind));
+        out->clear_from_m[i] = std::max(out->clear_from_m[i], margin / std::max(sine, 1e-6f));
+      }
+      const float own = seen_to(*out, i);
+      for (std::ptrdiff_t q = p + step; q >= 0 && q < count; q += step) {
+        const auto k = static_cast<std::size_t>(q);
+        const float cosine =
+            out->direction_x[i] * out->direction_x[k] + out->direction_y[i] * out->direction_y[k];
+        if (cosine <= 0.0f || own * sine_between(*out, i, k) > margin) break;
+        out->clear_to_m[k] = std::min(out->clear_to_m[k], own);
+      }
+    }
+  };
+  pass(0, 1);
+  pass(static_cast<std::ptrdiff_t>(n) - 1, -1);
+}
+
+void set_reach(TsdfObservation* out) {
+  float reach = 0.0f;
+  for (std::size_t i = 0; i < out->columns(); ++i) {
+    if (!std::isnan(out->range_m[i])) reach = std::max(reach, out->range_m[i] + out->truncation_m[i]);
+    if (out->free_to_m[i] >= out->free_from_m[i]) reach = std::max(reach, out->free_to_m[i]);
+  }
+  out->reach_m = reach;
+}
+
+}  // namespace
+
+int TsdfObservation::valid_ranges() const {
+  return static_cast<int>(std::count_if(range_m.begin(), range_m.end(), [](float r) { return !std::isnan(r); }));
+}
+
+void observation_from(const DepthProfile& profile, const ObservationLimits& limits, TsdfObservation* out) {
+  const std::size_t n = profile.z_m.size();
+  resize(n, out);
+  out->stamp_s = profile.stamp_s;
+  out->pinhole = true;
+  out->fx_px = static_cast<float>(profile.fx_px);
+  out->cx_px = static_cast<float>(profile.cx_px);
+  const auto low = static_cast<float>(limits.range_min_m);
+  const auto high = static_cast<float>(std::min(limits.range_max_m, profile.range_max_m));
+  for (std::size_t i = 0; i < n; ++i) {
+    // Column u looks along ((u - cx) / fx, 1) in (right, forward); the sensor's y axis points left.
+    const float right = (static_cast<float>(i) - out->cx_px) / out->fx_px;
+    const float stretch = std::sqrt(1.0f + right * right);
+    out->direction_x[i] = 1.0f / stretch;
+    out->direction_y[i] = -right / stretch;
+    const float z = profile.z_m[i];
+    out->range_m[i] = z >= low && z <= high ? z * stretch : kNaN;  // equation 3: the range along the ray, not z
+    out->truncation_m[i] = std::isnan(out->range_m[i]) ? 0.0f : limits.truncation.at(out->range_m[i]);
+    const float from = profile.free_from_m[i], to = std::min(profile.free_to_m[i], high);
+    const bool free = from >= 0.0f && to > from;
+    out->free_from_m[i] = free ? from * stretch : 0.0f;
+    out->free_to_m[i] = free ? to * stretch : -1.0f;
+    if (free && !std::isnan(out->range_m[i])) out->free_to_m[i] = std::min(out->free_to_m[i], out->range_m[i]);
+  }
+  set_clear(limits, out);
+  set_reach(out);
+}
+
+void observation_from(const RangeScan& scan, const ObservationLimits& limits, TsdfObservation* out) {
+  const std::size_t n = scan.range_m.size();
+  resize(n, out);
+  out->stamp_s = scan.stamp_s;
+  out->pinhole = false;
+  out->angle_min_rad = static_cast<float>(scan.angle_min_rad);
+  out->angle_increment_rad = static_cast<float>(scan.angle_increment_rad);
+  const auto low = static_cast<float>(std::max(limits.range_min_m, scan.range_min_m));
+  const auto high = static_cast<float>(std::min(limits.range_max_m, scan.range_max_m));
+  for (std::size_t i = 0; i < n; ++i) {
+    const double angle = scan.angle_min_rad + scan.angle_increment_rad * static_cast<double>(i);
+    out->direction_x[i] = static_cast<float>(std::cos(angle));
+    out->direction_y[i] = static_cast<float>(std::sin(angle));
+    const float r = scan.range_m[i];
+    out->range_m[i] = r >= low && r <= high ? r : kNaN;
+    out->truncation_m[i] = std::isnan(out->range_m[i]) ? 0.0f : limits.truncation.at(out->range_m[i]);
+    out->free_from_m[i] = 0.0f;
+    if (std::isinf(r) && r > 0.0f) {
+      const float beyond = std::min(high, static_cast<float>(limits.scan_free_beyond_m));
+      out->free_to_m[i] = beyond > 0.0f ? beyond : -1.0f;
+    } else {
+      out->free_to_m[i] = r > high ? high : r >= low ? r : -1.0f;
+    }
+  }
+  set_clear(limits, out);
+  set_reach(out);
+}
+
+}  // namespace knav

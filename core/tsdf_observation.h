@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/depth_profile.h"
+#include "core/pose2.h"
+#include "core/range_scan.h"
+
+namespace knav {
+
+/// How the truncation of the signed distance grows with the range r of the surface, as the sensor's noise does:
+/// mu(r) = base + per_range_squared r^2, at most `limit` (paper section III.D: "scaled with the distance to the
+/// obstacle along the ray"). A Kinect's disparity noise is about 0.0015 r^2.
+struct TruncationConfig {
+  double base_m = 0.4;
+  double per_range_squared = 0.003;
+  double limit_m = 2.0;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.number("base_m", base_m, 0.05, 5, "m", "Truncation at range 0.");
+    v.number("per_range_squared", per_range_squared, 0, 0.1, "1/m", "Its growth with the range squared.");
+    v.number("limit_m", limit_m, 0.05, 10, "m", "Its largest value.");
+  }
+  float at(float range_m) const {
+    const float mu = static_cast<float>(base_m) + static_cast<float>(per_range_squared) * range_m * range_m;
+    const auto limit = static_cast<float>(limit_m);
+    return mu < limit ? mu : limit;
+  }
+};
+
+/// One profile or scan as the grid takes it: per column the ranges along the column's ray, from a known pose. All
+/// that integrating needs is in here, so that removing recomputes exactly what was added.
+struct TsdfObservation {
+  double stamp_s = 0.0;
+  std::uint32_t sequence = 0;  ///< rises by one with every observation of a grid, from 1
+  float age_clock_s = 0.0f;    ///< the window's clock when it was taken
+  Pose2 T_map_sensor;
+
+  bool pinhole = true;             ///< columns evenly spaced on an image row; otherwise in angle
+  float fx_px = 0.0f, cx_px = 0.0f;
+  float angle_min_rad = 0.0f, angle_increment_rad = 0.0f;
+
+  // One entry per column.
+  std::vector<float> direction_x, direction_y;  ///< unit vector of the ray in the sensor's frame
+  std::vector<float> range_m;                   ///< NaN: no surface
+  std::vector<float> truncation_m;              ///< mu(range)
+  std::vector<float> free_from_m, free_to_m;    ///< carved between these; free_to < free_from: nothing
+  /// Between these nothing stands within a margin on either side of the ray.
+  std::vector<float> clear_from_m, clear_to_m;
+  float reach_m = 0.0f;           ///< no cell farther than this is touched
+
+  std::size_t columns() const { return range_m.size(); }
+  int valid_ranges() const;
+};
+
+/// What of a frame is used.
+struct ObservationLimits {
+  double range_min_m = 0.3;
+  double range_max_m = 20.0;
+  double scan_free_beyond_m = 0.0;  ///< how far a scan's +Inf counts as seen free
+  double clear_margin_m = 0.1;      ///< lateral, see TsdfObservation::clear_to_m
+  TruncationConfig truncation;
+};
+
+/// Free space of a profile lies between its free_from and free_to. Reuses the memory of *out.
+void observation_from(const DepthProfile& profile, const ObservationLimits& limits, TsdfObservation* out);
+/// Free space of a scan is the whole ray up to its return.
+void observation_from(const RangeScan& scan, const ObservationLimits& limits, TsdfObservation* out);
+
+}  // namespace knav

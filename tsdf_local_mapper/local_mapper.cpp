@@ -1,0 +1,365 @@
+#include "tsdf_local_mapper/local_mapper.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/config.h"
+#include "core/contour.h"
+#include "core/pose_buffer.h"
+#include "tsdf_local_mapper/local_map.h"
+#include "tsdf_local_mapper/odometry_learner.h"
+#include "tsdf_local_mapper/pose_filter.h"
+#include "tsdf_local_mapper/sliding_window.h"
+#include "tsdf_local_mapper/view_check.h"
+
+namespace knav {
+namespace {
+
+constexpr int kFewestReadings = 10;
+constexpr double kParkedAfter_s = 0.5, kParkedWithin_m = 0.005, kParkedWithin_rad = 0.004;
+
+const LocalMapperConfig& checked(const LocalMapperConfig& config) {
+  const auto faults = config.validate();
+  if (!faults.empty()) throw_faults(faults);
+  return config;
+}
+
+ObservationLimits limits_of(const LocalMapperConfig& config) {
+  return {config.range_min_m, config.range_max_m, config.scan_free_beyond_m, config.tsdf.clear_margin_m,
+          config.tsdf.truncation};
+}
+
+}  // namespace
+
+const char* to_string(FrameOutcome outcome) {
+  switch (outcome) {
+    case FrameOutcome::kAligned: return "aligned";
+    case FrameOutcome::kStarted: return "started";
+    case FrameOutcome::kNoReadings: return "no readings";
+    case FrameOutcome::kParked: return "parked";
+    case FrameOutcome::kSuspicious: return "suspicious";
+    case FrameOutcome::kDuplicate: return "duplicate";
+    case FrameOutcome::kOutOfOrder: return "out of order";
+    case FrameOutcome::kWaitForOdometry: return "waiting for odometry";
+    case FrameOutcome::kNoOdometry: return "no odometry";
+    case FrameOutcome::kBadFrame: return "bad frame";
+  }
+  return "?";
+}
+
+const char* to_string(EpochReason reason) {
+  switch (reason) {
+    case EpochReason::kStart: return "start";
+    case EpochReason::kReset: return "reset";
+    case EpochReason::kClockJump: return "clock jumped back";
+    case EpochReason::kOdometryGap: return "odometry gap";
+    case EpochReason::kOdometryJump: return "odometry jumped";
+    case EpochReason::kCarried: return "carried";
+  }
+  return "?";
+}
+
+struct LocalMapper::State {
+  explicit State(const LocalMapperConfig& c)
+      : config(c),
+        limits(limits_of(c)),
+        grid(c.tsdf, c.grid_half_size_m),
+        window(c.window),
+        filter(c.filter, c.motion, static_cast<std::uint64_t>(c.seed)),
+        learner(c.filter.odometry_learning_m),
+        view_check(c.continuity, c.contour, c.range_max_m) {}
+
+  void add_odometry(double stamp_s, const Pose2& T_odom_base);
+  void new_epoch(EpochReason why, const std::string& text);
+  void forget_pose();
+  void note_motion(double stamp_s);
+  void select_points(const TsdfObservation& observation, const Pose2& T_base_sensor);
+  void align(const Pose2& T_step, const Pose2& T_base_sensor, double dt_s);
+  void integrate(const Pose2& T_base_sensor);
+  void learn_odometry();
+  const LocalMapperResult& reject(FrameOutcome outcome, double stamp_s, const std::string& reason);
+  template <class Frame>
+  const LocalMapperResult& update(const Frame& frame, bool sensible, const Pose2& T_base_sensor);
+
+  LocalMapperConfig config;
+  ObservationLimits limits;
+  TsdfGrid grid;
+  SlidingWindow window;
+  PoseFilter filter;
+  OdometryLearner learner;
+  ViewCheck view_check;
+  PoseBuffer odometry;
+  bool odometry_broken = false;  ///< a gap or jump since the last frame
+  EpochReason odometry_fault = EpochReason::kOdometryGap;
+  WeightedPoints points;
+
+  bool have_frame = false;   ///< stamp_s, T_odom_base and T_local_base of `result` mean something
+  bool have_map = false;
+  bool newest_integrated = false;
+  bool any_epoch = false;
+  double clock_s = 0.0;      ///< the window's clock
+  double travelled_m = 0.0;
+  Pose2 rest_T_odom_base;    ///< where the robot last was when it moved
+  double moved_stamp_s = 0.0;
+  bool parked = false;
+  std::string news;          ///< of an epoch, until an accepted frame has told it
+  Pose2 learn_T_odom, learn_T_local;  ///< start of the stretch that the learner compares next
+  LocalMapperResult result;
+  LocalMapperResult rejected;
+};
+
+void LocalMapper::State::add_odometry(double stamp_s, const Pose2& T_odom_base) {
+  if (!std::isfinite(stamp_s) || !is_finite(T_odom_base)) return;
+  if (!odometry.empty()) {
+    const double newest_s = odometry.newest_s();
+    if (stamp_s <= newest_s) {
+      if (newest_s - stamp_s <= config.continuity.clock_jump_s) return;
+      odometry.clear();  // the clock jumped back; the next frame will find so too
+    } else {
+      Pose2 newest;
+      odometry.at(newest_s, 1e9, 0.0, &newest);
+      const double dt = stamp_s - newest_s, step = distance_m(newest, T_odom_base);
+      if (dt > config.continuity.odometry_gap_s) {
+        odometry_broken = true;
+        odometry_fault = EpochReason::kOdometryGap;
+        odometry.clear();
+      } else if (step > config.continuity.odometry_max_speed_mps * std::max(dt, 0.02) + 0.05) {
+        odometry_broken = true;
+        odometry_fault = EpochReason::kOdometryJump;
+        odometry.clear();
+      }
+    }
+  }
+  odometry.add(stamp_s, T_odom_base);
+}
+
+const LocalMapperResult& LocalMapper::State::reject(FrameOutcome outcome, double stamp_s,
+                                                     const std::string& reason) {
+  rejected = result;
+  rejected.accepted = false;
+  rejected.outcome = outcome;
+  rejected.stamp_s = stamp_s;
+  rejected.reason = reason;
+  return rejected;
+}
+
+void LocalMapper::State::new_epoch(EpochReason why, const std::string& text) {
+  grid.clear();
+  window.clear();
+  have_map = false;
+  view_check.reset();
+  if (any_epoch) ++result.epoch;
+  any_epoch = true;
+  result.epoch_reason = why;
+  news = text;
+}
+
+void LocalMapper::State::forget_pose() {
+  have_frame = false;
+  result.T_local_base = Pose2{};
+  result.covariance.setZero();
+  learner.reset();
+  clock_s = travelled_m = 0.0;
+  parked = false;
+}
+
+void LocalMapper::State::note_motion(double stamp_s) {
+  const Pose2& now = result.T_odom_base;
+  if (distance_m(rest_T_odom_base, now) > kParkedWithin_m ||
+      std::fabs(normalize_angle_rad(now.yaw_rad - rest_T_odom_base.yaw_rad)) > kParkedWithin_rad) {
+    rest_T_odom_base = now;
+    moved_stamp_s = stamp_s;
+  }
+  parked = stamp_s - moved_stamp_s > kParkedAfter_s;
+}
+
+/// The readings that the filter compares: at most config.filter.readings, evenly over the valid columns.
+void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_base_sensor) {
+  points.clear();
+  const int valid = o.valid_ranges();
+  const double stride = std::max(1.0, static_cast<double>(valid) / config.filter.readings);
+  const double c = std::cos(T_base_sensor.yaw_rad), s = std::sin(T_base_sensor.yaw_rad);
+  double next = 0.5 * stride;
+  int seen = 0;
+  for (std::size_t i = 0; i < o.columns(); ++i) {
+    if (std::isnan(o.range_m[i])) continue;
+    if (++seen < next) continue;
+    next += stride;
+    const double x = o.direction_x[i] * o.range_m[i], y = o.direction_y[i] * o.range_m[i];
+    points.add(static_cast<float>(T_base_sensor.x_m + c * x - s * y),
+               static_cast<float>(T_base_sensor.y_m + s * x + c * y), 1.0f);
+  }
+}
+
+void LocalMapper::State::integrate(const Pose2& T_base_sensor) {
+  window.scratch().T_map_sensor = result.T_local_base * T_base_sensor;
+  grid.scroll_to(result.T_local_base.x_m, result.T_local_base.y_m, window.next_sequence());
+  window.expire(&grid, clock_s, travelled_m);
+  window.push(&grid, clock_s, travelled_m, parked && config.window.clock == "moving");
+}
+
+void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, double dt_s) {
+  const TsdfObservation& observation = window.scratch();
+  select_points(observation, T_base_sensor);
+  const bool readings = points.size() >= static_cast<std::size_t>(kFewestReadings);
+  result.outcome = readings ? FrameOutcome::kAligned : FrameOutcome::kNoReadings;
+  if (!have_map) {
+    filter.shift(T_step);
+    have_map = readings;
+    if (readings) result.outcome = FrameOutcome::kStarted;
+  } else if (parked) {
+    filter.shift(T_step);
+    result.outcome = FrameOutcome::kParked;
+  } else {
+    filter.predict(learner.corrected(T_step));
+    if (readings) {
+      filter.update(grid, points, result.stamp_s);
+    } else {
+      filter.estimate_from_particles();
+    }
+  }
+  result.T_local_base = filter.mean();
+  result.covariance = filter.covariance();
+  result.covariance.diagonal() += Eigen::Vector3d(1e-6, 1e-6, 1e-6);  // what a cell's 8 bits resolve
+  if (!readings || result.outcome == FrameOutcome::kStarted) return;
+  view_check.update(grid, observation, result.T_local_base * T_base_sensor, dt_s);
+  if (view_check.carried()) {
+    new_epoch(EpochReason::kCarried, "the robot was carried: it looks through the walls that it knew");
+    filter.start_at(result.T_local_base, result.stamp_s);
+    have_map = true;
+    result.outcome = FrameOutcome::kStarted;
+  } else if (view_check.suspicious()) {
+    result.outcome = FrameOutcome::kSuspicious;
+  }
+}
+
+void LocalMapper::State::learn_odometry() {
+  const Pose2 odometry_step = learn_T_odom.inverse() * result.T_odom_base;
+  const bool aligned = result.outcome == FrameOutcome::kAligned;
+  const bool far = std::hypot(odometry_step.x_m, odometry_step.y_m) > 0.3 || std::fabs(odometry_step.yaw_rad) > 0.3;
+  if (aligned && !far) return;
+  if (aligned) learner.learn(odometry_step, learn_T_local.inverse() * result.T_local_base);
+  learn_T_odom = result.T_odom_base;
+  learn_T_local = result.T_local_base;
+}
+
+template <class Frame>
+const LocalMapperResult& LocalMapper::State::update(const Frame& frame, bool sensible, const Pose2& T_base_sensor) {
+  const double stamp_s = frame.stamp_s;
+  if (!sensible || !std::isfinite(stamp_s) || !is_finite(T_base_sensor)) {
+    return reject(FrameOutcome::kBadFrame, stamp_s, "the frame has no columns, or a stamp or model that makes no sense");
+  }
+  if (have_frame && stamp_s <= result.stamp_s) {
+    if (stamp_s == result.stamp_s) return reject(FrameOutcome::kDuplicate, stamp_s, "this stamp was seen before");
+    if (result.stamp_s - stamp_s <= config.continuity.clock_jump_s) {
+      return reject(FrameOutcome::kOutOfOrder, stamp_s, "older than the newest frame");
+    }
+    const std::string text =
+        fmt::format("the clock jumped back by {:.1f} s; map and pose start anew", result.stamp_s - stamp_s);
+    if (!odometry.empty() && odometry.oldest_s() > stamp_s + config.continuity.clock_jump_s) odometry.clear();
+    new_epoch(EpochReason::kClockJump, text);
+    forget_pose();
+  }
+  Pose2 T_odom_base;
+  switch (odometry.at(stamp_s, config.continuity.odometry_gap_s, config.continuity.odometry_extrapolation_s,
+                      &T_odom_base)) {
+    case PoseBuffer::Lookup::kOk:
+      break;
+    case PoseBuffer::Lookup::kEmpty:
+    case PoseBuffer::Lookup::kTooNew:
+      return reject(FrameOutcome::kWaitForOdometry, stamp_s, "odometry does not cover the frame's stamp yet");
+    case PoseBuffer::Lookup::kTooOld:
+      return reject(FrameOutcome::kNoOdometry, stamp_s, "odometry does not reach back to the frame's stamp");
+    case PoseBuffer::Lookup::kGap:
+      return reject(FrameOutcome::kNoOdometry, stamp_s, "odometry has a gap at the frame's stamp");
+  }
+  if (!any_epoch) new_epoch(EpochReason::kStart, "");
+  if (have_frame && odometry_broken) {
+    new_epoch(odometry_fault, odometry_fault == EpochReason::kOdometryGap
+                                  ? "odometry was silent; nothing links the poses before and after"
+                                  : "odometry jumped; nothing links the poses before and after");
+    result.T_odom_base = T_odom_base;  // no step
+  }
+  odometry_broken = false;
+
+  const Pose2 T_step = have_frame ? result.T_odom_base.inverse() * T_odom_base : Pose2{};
+  const double dt = have_frame ? stamp_s - result.stamp_s : 0.0;
+  result.stamp_s = stamp_s;
+  result.T_odom_base = T_odom_base;
+  if (!have_frame) {
+    rest_T_odom_base = T_odom_base;
+    moved_stamp_s = stamp_s;
+    filter.start_at(result.T_local_base, stamp_s);
+  }
+  have_frame = true;
+  note_motion(stamp_s);
+  travelled_m += std::hypot(T_step.x_m, T_step.y_m);
+  if (!parked || config.window.clock == "paper") clock_s += dt;
+
+  observation_from(frame, limits, &window.scratch());
+  align(T_step, T_base_sensor, dt);
+  newest_integrated = result.outcome != FrameOutcome::kSuspicious;
+  if (newest_integrated) integrate(T_base_sensor);
+  learn_odometry();
+
+  result.accepted = true;
+  result.reason = std::move(news);
+  news.clear();
+  result.cost = filter.mean_cost();
+  result.effective_particles = filter.effective_particles();
+  result.particle_lifespan_s = filter.lifespan_s(stamp_s);
+  result.agree_fraction = view_check.agree_fraction();
+  result.see_through_fraction = view_check.see_through_fraction();
+  result.observations = window.size();
+  return result;
+}
+
+LocalMapper::LocalMapper(const LocalMapperConfig& config) : state_(std::make_unique<State>(checked(config))) {}
+LocalMapper::~LocalMapper() = default;
+
+void LocalMapper::add_odometry(double stamp_s, const Pose2& T_odom_base) { state_->add_odometry(stamp_s, T_odom_base); }
+
+const LocalMapperResult& LocalMapper::update(const DepthProfile& profile, const Pose2& T_base_camera) {
+  const std::size_t columns = profile.z_m.size();
+  const bool sensible = columns > 0 && profile.free_from_m.size() == columns &&
+                        profile.free_to_m.size() == columns && profile.fx_px > 0.0 && std::isfinite(profile.fx_px) &&
+                        std::isfinite(profile.cx_px);
+  return state_->update(profile, sensible, T_base_camera);
+}
+
+const LocalMapperResult& LocalMapper::update(const RangeScan& scan, const Pose2& T_base_sensor) {
+  const double turn = std::fabs(scan.angle_increment_rad) * static_cast<double>(scan.range_m.size());
+  const bool sensible = !scan.range_m.empty() && std::isfinite(scan.angle_min_rad) && turn > 0.0 && turn < 6.5;
+  return state_->update(scan, sensible, T_base_sensor);
+}
+
+void LocalMapper::extract_scan_360(RangeScan* scan) const {
+  const State& s = *state_;
+  extract_contour(s.grid, s.config.contour, s.result.T_local_base, static_cast<float>(s.clock_s), scan);
+  scan->stamp_s = s.result.stamp_s;
+  if (s.config.contour.merge_newest && s.window.size() > 0 && s.newest_integrated) {
+    merge_newest(s.window.at(s.window.size() - 1), s.result.T_local_base, scan);
+  }
+}
+
+void LocalMapper::extract_local_map(OccupancyGrid* map) const {
+  const State& s = *state_;
+  extract_occupancy(s.grid, s.result.T_local_base.x_m, s.result.T_local_base.y_m, s.config.local_map_size_m, map);
+}
+
+void LocalMapper::reset() {
+  state_->new_epoch(EpochReason::kReset, "reset on request; map and pose start anew");
+  state_->forget_pose();
+  state_->odometry.clear();
+  state_->odometry_broken = false;
+}
+
+const LocalMapperConfig& LocalMapper::config() const { return state_->config; }
+const LocalMapperResult& LocalMapper::result() const { return state_->result; }
+const TsdfGrid& LocalMapper::grid() const { return state_->grid; }
+const ParticleSet& LocalMapper::particles() const { return state_->filter.particles(); }
+
+}  // namespace knav

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "core/depth_profile.h"
+#include "core/grid_geometry.h"
+#include "core/particle_filter.h"
+#include "core/pose2.h"
+#include "core/range_scan.h"
+#include "core/tsdf_grid.h"
+#include "tsdf_local_mapper/local_mapper_config.h"
+
+namespace knav {
+
+/// What became of a frame.
+enum class FrameOutcome {
+  kAligned,          ///< compared with the map and integrated
+  kStarted,          ///< the first frame of a map
+  kNoReadings,       ///< too few readings to align; the pose follows odometry
+  kParked,           ///< the wheels stand; the pose is kept
+  kSuspicious,       ///< does not fit the map; the pose follows odometry, nothing was integrated
+  kDuplicate,        ///< not accepted: this stamp was seen
+  kOutOfOrder,       ///< not accepted: older than the newest frame
+  kWaitForOdometry,  ///< not accepted: newer than odometry; ask again when more has come
+  kNoOdometry,       ///< not accepted: odometry does not reach back so far, or has a gap there
+  kBadFrame,         ///< not accepted: no columns, or a nonsensical model or stamp
+};
+const char* to_string(FrameOutcome outcome);
+
+/// Why the epoch changed last.
+enum class EpochReason { kStart, kReset, kClockJump, kOdometryGap, kOdometryJump, kCarried };
+const char* to_string(EpochReason reason);
+
+struct LocalMapperResult {
+  bool accepted = false;
+  FrameOutcome outcome = FrameOutcome::kBadFrame;
+  std::string reason;  ///< a sentence if not accepted or if the epoch changed, else empty
+  double stamp_s = 0.0;
+  Pose2 T_local_base;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< (x, y, yaw) in the local map's frame [m, rad]
+  std::uint32_t epoch = 0;
+  EpochReason epoch_reason = EpochReason::kStart;
+  Pose2 T_odom_base;  ///< odometry at the frame's stamp
+
+  // For diagnostics.
+  double cost = 0.0;                  ///< of the estimate, 0 ... 1 (NaN if nothing was compared)
+  double effective_particles = 0.0;
+  double particle_lifespan_s = 0.0;   ///< how long ago all particles had one ancestor
+  double agree_fraction = 0.0;        ///< readings on known rays that meet the map's surface
+  double see_through_fraction = 0.0;  ///< ... that lie behind it
+  int observations = 0;               ///< held in the map
+};
+
+/// Paper sections III.D-III.F: keeps a sliding-window signed distance map, estimates the robot's motion by aligning
+/// each new profile with it, and looks round in it by 360 degrees. Not thread safe. Same input and seed give the
+/// same bytes.
+class LocalMapper {
+ public:
+  /// Throws UserError if the configuration is not valid.
+  explicit LocalMapper(const LocalMapperConfig& config);
+  ~LocalMapper();
+  LocalMapper(const LocalMapper&) = delete;
+  LocalMapper& operator=(const LocalMapper&) = delete;
+
+  /// Stamps should rise; others are ignored, except a jump back, which restarts the mapper's odometry.
+  void add_odometry(double stamp_s, const Pose2& T_odom_base);
+
+  /// @param T_base_camera the levelled camera's planar pose, x = forward
+  const LocalMapperResult& update(const DepthProfile& profile, const Pose2& T_base_camera);
+  const LocalMapperResult& update(const RangeScan& scan, const Pose2& T_base_sensor);
+
+  /// The virtual 360-degree scan from the newest pose, in the robot's frame (section III.F, III.H).
+  void extract_scan_360(RangeScan* scan) const;
+  /// A square of the map round the robot, in the local map's frame: 0 free, 100 surface, -1 unknown.
+  void extract_local_map(OccupancyGrid* map) const;
+  /// Forgets map, pose and odometry; a new epoch.
+  void reset();
+
+  const LocalMapperConfig& config() const;
+  const LocalMapperResult& result() const;
+  const TsdfGrid& grid() const;
+  const ParticleSet& particles() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace knav

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/contour.h"
+#include "core/motion_model.h"
+#include "core/tsdf_grid.h"
+
+namespace knav {
+
+/// Which observations the map holds (paper section III.E: 120 s, 20 m).
+struct WindowConfig {
+  double duration_s = 120.0;
+  double distance_m = 20.0;
+  std::string clock = "moving";
+  int max_observations = 3600;
+  int parked_observations = 60;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.number("duration_s", duration_s, 1, 3600, "s", "An observation leaves the map after this long.");
+    v.number("distance_m", distance_m, 1, 200, "m", "An observation leaves after the robot drove this far.");
+    v.choice("clock", clock, {"paper", "moving"},
+             "What duration_s counts: all time, or only the time the robot moves (a parked robot keeps its walls).");
+    v.integer("max_observations", max_observations, 10, 100000, "frames", "The oldest leaves when there are more.");
+    v.integer("parked_observations", parked_observations, 1, 100000, "frames",
+              "While parked (clock: moving) only this many of the newest frames of that place are held.");
+  }
+};
+
+/// The particle filter over the robot's pose (paper section III.E).
+struct FilterConfig {
+  int particles = 1000;
+  int readings = 120;
+  std::string alignment_cost = "normalized";
+  double temperature = 0.008;
+  double paper_temperature = 0.02;
+  double unknown_price = 0.6;
+  int refinements = 2;
+  double odometry_learning_m = 10.0;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.integer("particles", particles, 10, 200000, "", "Pose hypotheses.");
+    v.integer("readings", readings, 8, 4000, "", "Readings of a frame that are compared with the map, at most.");
+    v.choice("alignment_cost", alignment_cost, {"paper", "normalized"},
+             "paper: sum of |F W| (equation 7). normalized: mean of |F|, with a price for unknown cells.");
+    v.number("temperature", temperature, 1e-5, 1, "", "normalized: a cost difference this large means a factor e.");
+    v.number("paper_temperature", paper_temperature, 1e-5, 10, "", "paper: the same, times the mean weight W.");
+    v.number("unknown_price", unknown_price, 0, 1, "", "normalized: cost of a reading in a cell never seen.");
+    v.integer("refinements", refinements, 0, 10, "", "Rounds of resampling with shrinking noise within a frame.");
+    v.number("odometry_learning_m", odometry_learning_m, 0, 1000, "m",
+             "Distance over which odometry's steady errors are learned and taken out of the proposal; 0 = never.");
+  }
+};
+
+/// When the mapper stops trusting that the map and the view belong together.
+struct ContinuityConfig {
+  double odometry_gap_s = 1.0;
+  double odometry_extrapolation_s = 0.1;
+  double odometry_max_speed_mps = 5.0;
+  double clock_jump_s = 1.0;
+  double carried_after_s = 1.0;
+  double carried_see_through_fraction = 0.5;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.number("odometry_gap_s", odometry_gap_s, 0.05, 60, "s", "Odometry silent for longer starts a new epoch.");
+    v.number("odometry_extrapolation_s", odometry_extrapolation_s, 0, 1, "s",
+             "A frame may be this much newer than the newest odometry.");
+    v.number("odometry_max_speed_mps", odometry_max_speed_mps, 0.1, 100, "m/s",
+             "Odometry that jumps faster than this was reset: a new epoch.");
+    v.number("clock_jump_s", clock_jump_s, 0, 60, "s", "A frame older than the newest by more: the clock jumped.");
+    v.number("carried_after_s", carried_after_s, 0.1, 60, "s",
+             "Looking through known walls for this long means that the robot was carried: a new epoch.");
+    v.number("carried_see_through_fraction", carried_see_through_fraction, 0.05, 1, "",
+             "Share of the readings on known rays that lie behind the map's surface, to count as that.");
+  }
+};
+
+struct LocalMapperConfig {
+  int seed = 1;
+  double range_min_m = 0.3;
+  double range_max_m = 20.0;
+  double scan_free_beyond_m = 0.0;
+  double grid_half_size_m = 25.0;
+  double local_map_size_m = 20.0;
+  TsdfConfig tsdf;
+  WindowConfig window;
+  FilterConfig filter;
+  MotionModelConfig motion;
+  ContourConfig contour;
+  ContinuityConfig continuity;
+
+  LocalMapperConfig();
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.integer("seed", seed, 0, 2147483647, "", "Of all random numbers: same input and seed, same bytes.");
+    v.number("range_min_m", range_min_m, 0, 5, "m", "Readings nearer than this are ignored.");
+    v.number("range_max_m", range_max_m, 1, 100, "m", "Readings farther than this are ignored.");
+    v.number("scan_free_beyond_m", scan_free_beyond_m, 0, 100, "m",
+             "LaserScan: how far a ray without a return (+Inf) counts as seen free; 0 = it says nothing.");
+    v.number("grid_half_size_m", grid_half_size_m, 1, 200, "m",
+             "The map reaches at least this far from the robot (rounded up to a power of two of cells).");
+    v.number("local_map_size_m", local_map_size_m, 1, 100, "m", "Side of the published local_map.");
+    v.group("tsdf", tsdf, "The signed distance grid.");
+    v.group("window", window, "What the map remembers.");
+    v.group("filter", filter, "The particle filter.");
+    v.group("motion", motion, "How wrong odometry may be.");
+    v.group("contour", contour, "The virtual 360-degree scan.");
+    v.group("continuity", continuity, "Gaps, jumps and being carried.");
+  }
+  /// One sentence per fault, empty if none.
+  std::vector<std::string> validate() const;
+};
+
+}  // namespace knav

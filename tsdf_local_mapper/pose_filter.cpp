@@ -1,0 +1,122 @@
+#include "tsdf_local_mapper/pose_filter.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/random.h"
+#include "core/tsdf_alignment.h"
+
+namespace knav {
+
+PoseFilter::PoseFilter(const FilterConfig& config, const MotionModelConfig& motion, std::uint64_t seed)
+    : config_(config), motion_(motion), seed_(seed) {
+  particles_.resize(static_cast<std::size_t>(config.particles));
+  ancestor_.resize(particles_.size());
+  start_at(Pose2{}, 0.0);
+}
+
+void PoseFilter::start_at(const Pose2& pose, double stamp_s) {
+  for (std::size_t i = 0; i < particles_.size(); ++i) particles_.set(i, pose);
+  std::fill(particles_.weight.begin(), particles_.weight.end(), 1.0 / static_cast<double>(particles_.size()));
+  for (std::size_t i = 0; i < ancestor_.size(); ++i) ancestor_[i] = static_cast<std::uint32_t>(i);
+  ancestor_stamp_s_ = mark_stamp_s_ = stamp_s;
+  mean_ = pose;
+  covariance_.setZero();
+  mean_cost_ = std::numeric_limits<double>::quiet_NaN();
+  effective_ = static_cast<double>(particles_.size());
+}
+
+void PoseFilter::predict(const Pose2& T_before_after) {
+  sample_motion(motion_, T_before_after, seed_, random_stream::kMotion, step_++, particles_);
+}
+
+void PoseFilter::shift(const Pose2& T_before_after) {
+  for (std::size_t i = 0; i < particles_.size(); ++i) particles_.set(i, particles_.pose(i) * T_before_after);
+  mean_ = mean_ * T_before_after;
+}
+
+void PoseFilter::estimate_from_particles() {
+  const PoseEstimate estimate = weighted_mean(particles_);
+  mean_ = estimate.mean;
+  covariance_ = estimate.covariance;
+  effective_ = effective_sample_size(particles_);
+  mean_cost_ = std::numeric_limits<double>::quiet_NaN();
+}
+
+void PoseFilter::weigh(const TsdfGrid& grid, const WeightedPoints& points, double share) {
+  if (config_.alignment_cost == "paper") {
+    float mean_weight = 0.0f;
+    tsdf_paper_costs(grid, points, particles_, &cost_, &mean_weight);
+    const double temperature = config_.paper_temperature * std::max(1e-6, static_cast<double>(mean_weight)) *
+                               static_cast<double>(points.size());
+    weigh_by_cost(particles_, cost_, temperature / share);
+    for (float& cost : cost_) {
+      cost /= std::max(1e-6f, mean_weight) * static_cast<float>(std::max<std::size_t>(1, points.size()));
+    }
+  } else {
+    tsdf_alignment_costs(grid, points, particles_, static_cast<float>(config_.unknown_price), &cost_);
+    weigh_by_cost(particles_, cost_, config_.temperature / share);
+  }
+}
+
+void PoseFilter::resample() {
+  RandomStream random(seed_, random_stream::kResample, step_++, 0);
+  resample_low_variance(particles_, static_cast<std::size_t>(config_.particles), random.uniform(), &parent_);
+  ancestor_scratch_.resize(parent_.size());
+  for (std::size_t i = 0; i < parent_.size(); ++i) ancestor_scratch_[i] = ancestor_[parent_[i]];
+  ancestor_.swap(ancestor_scratch_);
+}
+
+void PoseFilter::jitter(const Pose2& center, const Eigen::Matrix3d& covariance, double width) {
+  // A little more than the spread itself, so that it never collapses below what the grid resolves.
+  Eigen::Matrix3d floor = Eigen::Matrix3d::Zero();
+  floor.diagonal() << 4e-6, 4e-6, 1e-6;
+  const Eigen::Matrix3d root = Eigen::LLT<Eigen::Matrix3d>(covariance * width * width + floor).matrixL();
+  // Shrinking towards the mean first keeps the spread as it is (Liu and West).
+  const double keep = std::sqrt(std::max(0.0, 1.0 - width * width));
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    RandomStream random(seed_, random_stream::kMotion, step_, static_cast<std::uint32_t>(i));
+    const double a = random.normal(), b = random.normal(), c = random.normal();
+    const Eigen::Vector3d noise = root * Eigen::Vector3d(a, b, c);
+    const Pose2 p = particles_.pose(i);
+    const double yaw = normalize_angle_rad(p.yaw_rad - center.yaw_rad);
+    particles_.set(i, {center.x_m + keep * (p.x_m - center.x_m) + noise.x(),
+                       center.y_m + keep * (p.y_m - center.y_m) + noise.y(),
+                       normalize_angle_rad(center.yaw_rad + keep * yaw + noise.z())});
+  }
+  ++step_;
+}
+
+void PoseFilter::update(const TsdfGrid& grid, const WeightedPoints& points, double stamp_s) {
+  // Annealing: the likelihood enters in shares that sum to 1, the last and largest on the finest samples.
+  double total = 0.0, share = 1.0;
+  for (int r = 0; r <= config_.refinements; ++r, share *= 3.0) total += share;
+  share = 1.0 / total;
+  PoseEstimate estimate;
+  for (int r = 0; r <= config_.refinements; ++r, share *= 3.0) {
+    if (r > 0) {
+      resample();
+      jitter(estimate.mean, estimate.covariance, 0.5);
+    }
+    weigh(grid, points, share);
+    estimate = weighted_mean(particles_);
+  }
+  mean_ = estimate.mean;
+  covariance_ = estimate.covariance;
+  effective_ = effective_sample_size(particles_);
+  mean_cost_ = 0.0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) mean_cost_ += particles_.weight[i] * cost_[i];
+  if (effective_ < 0.5 * static_cast<double>(particles_.size())) resample();
+  track_ancestors(stamp_s);
+}
+
+void PoseFilter::track_ancestors(double stamp_s) {
+  if (!std::all_of(ancestor_.begin(), ancestor_.end(), [&](std::uint32_t a) { return a == ancestor_[0]; })) return;
+  ancestor_stamp_s_ = mark_stamp_s_;
+  mark_stamp_s_ = stamp_s;
+  for (std::size_t i = 0; i < ancestor_.size(); ++i) ancestor_[i] = static_cast<std::uint32_t>(i);
+}
+
+}  // namespace knav

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/cost_field.h"
+#include "core/motion_model.h"
+#include "core/particle_filter.h"
+#include "core/tsdf_grid.h"
+#include "tsdf_local_mapper/local_mapper_config.h"
+
+namespace knav {
+
+/// The multi-hypothesis search over the robot's pose of paper section III.E: a particle filter whose observation
+/// model is the alignment cost on the signed distance map.
+class PoseFilter {
+ public:
+  PoseFilter(const FilterConfig& config, const MotionModelConfig& motion, std::uint64_t seed);
+
+  /// All particles at one pose.
+  void start_at(const Pose2& pose, double stamp_s);
+  /// Odometry's step with its noise.
+  void predict(const Pose2& T_before_after);
+  /// Weighs the particles by how well the readings fit, refines them, and leaves the estimate in mean() etc.
+  void update(const TsdfGrid& grid, const WeightedPoints& points_robot, double stamp_s);
+  /// The estimate without a measurement.
+  void estimate_from_particles();
+  /// Moves all particles and the estimate rigidly, without noise.
+  void shift(const Pose2& T_before_after);
+
+  const Pose2& mean() const { return mean_; }
+  const Eigen::Matrix3d& covariance() const { return covariance_; }
+  double mean_cost() const { return mean_cost_; }
+  double effective_particles() const { return effective_; }
+  /// How long ago all present particles had one common ancestor.
+  double lifespan_s(double stamp_s) const { return stamp_s - ancestor_stamp_s_; }
+  const ParticleSet& particles() const { return particles_; }
+
+ private:
+  void weigh(const TsdfGrid& grid, const WeightedPoints& points, double share);
+  void jitter(const Pose2& center, const Eigen::Matrix3d& covariance, double width);
+  void resample();
+  void track_ancestors(double stamp_s);
+
+  FilterConfig config_;
+  MotionModelConfig motion_;
+  std::uint64_t seed_;
+  std::uint64_t step_ = 0;
+  ParticleSet particles_;
+  std::vector<float> cost_;
+  std::vector<std::uint32_t> parent_, ancestor_, ancestor_scratch_;
+  double ancestor_stamp_s_ = 0.0, mark_stamp_s_ = 0.0;
+  Pose2 mean_;
+  Eigen::Matrix3d covariance_ = Eigen::Matrix3d::Zero();
+  double mean_cost_ = 0.0, effective_ = 0.0;
+};
+
+}  // namespace knav

@@ -1,0 +1,56 @@
+#include "tsdf_local_mapper/sliding_window.h"
+
+namespace knav {
+
+TsdfObservation& SlidingWindow::scratch() {
+  if (free_.empty()) {
+    free_.push_back(slots_.size());
+    slots_.push_back(std::make_unique<Slot>());
+  }
+  return slots_[free_.back()]->observation;
+}
+
+void SlidingWindow::push(TsdfGrid* grid, double clock_s, double travelled_m, bool parked) {
+  if (parked) {
+    std::size_t run = 0;  // parked frames at the end of the queue are those of this place
+    while (run < order_.size() && slots_[order_[order_.size() - 1 - run]]->parked) ++run;
+    if (run >= static_cast<std::size_t>(config_.parked_observations)) remove(grid, order_.size() - run);
+  }
+  if (size() >= config_.max_observations) remove(grid, 0);
+  // remove() hands its slot back on top of the free list; the scratch slot is the one being written.
+  scratch();
+  const std::size_t index = free_.back();
+  free_.pop_back();
+  Slot& slot = *slots_[index];
+  slot.clock_s = clock_s;
+  slot.travelled_m = travelled_m;
+  slot.parked = parked;
+  slot.observation.sequence = next_sequence_++;
+  slot.observation.age_clock_s = static_cast<float>(clock_s);
+  grid->add(slot.observation);
+  order_.push_back(index);
+}
+
+void SlidingWindow::expire(TsdfGrid* grid, double clock_s, double travelled_m) {
+  while (!order_.empty()) {
+    const Slot& oldest = *slots_[order_.front()];
+    const bool old = clock_s - oldest.clock_s > config_.duration_s;
+    const bool far = travelled_m - oldest.travelled_m > config_.distance_m;
+    if (!old && !far) break;
+    remove(grid, 0);
+  }
+}
+
+void SlidingWindow::clear() {
+  free_.insert(free_.begin(), order_.begin(), order_.end());
+  order_.clear();
+}
+
+void SlidingWindow::remove(TsdfGrid* grid, std::size_t position) {
+  const std::size_t index = order_[position];
+  grid->remove(slots_[index]->observation);
+  order_.erase(order_.begin() + static_cast<std::ptrdiff_t>(position));
+  free_.insert(free_.begin(), index);  // not on top: that is the scratch slot
+}
+
+}  // namespace knav

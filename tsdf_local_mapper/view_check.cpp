@@ -1,0 +1,35 @@
+#include "tsdf_local_mapper/view_check.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace knav {
+namespace {
+constexpr std::size_t kRays = 64;
+constexpr int kFewestKnown = 12;
+}  // namespace
+
+void ViewCheck::update(const TsdfGrid& grid, const TsdfObservation& o, const Pose2& T_map_sensor, double dt_s) {
+  const double c = std::cos(T_map_sensor.yaw_rad), s = std::sin(T_map_sensor.yaw_rad);
+  const std::size_t stride = std::max<std::size_t>(1, o.columns() / kRays);
+  int known = 0, agree = 0, through = 0;
+  for (std::size_t i = stride / 2; i < o.columns(); i += stride) {
+    if (std::isnan(o.range_m[i])) continue;
+    const double x = o.direction_x[i], y = o.direction_y[i];
+    const RayEnd end =
+        cast_ray(grid, contour_, T_map_sensor.x_m, T_map_sensor.y_m, c * x - s * y, s * x + c * y, range_max_m_);
+    if (end.kind != RayEnd::Kind::kSurface) continue;
+    ++known;
+    const double tolerance_m = std::max(0.25, 0.75 * static_cast<double>(o.truncation_m[i]));
+    const double difference_m = o.range_m[i] - end.range_m;
+    if (std::fabs(difference_m) <= tolerance_m) ++agree;
+    if (difference_m > tolerance_m) ++through;
+  }
+  agree_ = known > 0 ? static_cast<double>(agree) / known : 0.0;
+  through_ = known > 0 ? static_cast<double>(through) / known : 0.0;
+  suspicious_ = known >= kFewestKnown && through_ >= config_.carried_see_through_fraction;
+  // Leaky, so that a good frame between bad ones does not start the count again.
+  suspicious_s_ = suspicious_ ? suspicious_s_ + dt_s : std::max(0.0, suspicious_s_ - 2.0 * dt_s);
+}
+
+}  // namespace knav
