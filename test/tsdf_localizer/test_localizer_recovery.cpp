@@ -1,0 +1,230 @@
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+
+#include "synthetic_building.h"
+#include "tsdf_localizer/localizer.h"
+
+namespace knav {
+namespace {
+
+using test::Building;
+using test::ScanModel;
+using V = LocalizationVerdict;
+
+constexpr double kRate_hz = 15.0;
+
+ScanModel kinect(double seen_rad) {
+  ScanModel model;
+  model.noise_m = 0.01;
+  model.noise_per_range_squared = 0.002;
+  model.fresh_fov_rad = 57.0 * kPi / 180.0;
+  (void)seen_rad;
+  return model;
+}
+
+/// scan_360 of a mapper that was reset: only what the camera has swept since is known.
+RangeScan swept_scan(const Building& world, const std::vector<Pose2>& truth, std::size_t since,
+                     std::size_t now) {
+  ScanModel model = kinect(0.0);
+  RangeScan scan = make_scan(world, truth[now], model, static_cast<double>(now) / kRate_hz);
+  for (std::size_t i = 0; i < scan.range_m.size(); ++i) {
+    const double angle =
+        truth[now].yaw_rad + scan.angle_min_rad + scan.angle_increment_rad * static_cast<double>(i);
+    bool seen = false;
+    for (std::size_t k = since; k <= now && !seen; ++k) {
+      seen = std::fabs(normalize_angle_rad(angle - truth[k].yaw_rad)) <= model.fresh_fov_rad / 2.0;
+    }
+    if (!seen) {
+      scan.range_m[i] = NAN;
+      scan.evidence[i] = 0.0f;
+    }
+  }
+  return scan;
+}
+
+/// Turns once on the spot, then drives on.
+std::vector<Pose2> spin_and_drive(const Pose2& start, const std::vector<Point2>& points) {
+  std::vector<Pose2> poses;
+  const int steps = static_cast<int>(2.0 * kPi * kRate_hz / 0.8);
+  for (int i = 0; i < steps; ++i) {
+    poses.push_back({start.x_m, start.y_m, normalize_angle_rad(start.yaw_rad + 2.0 * kPi * i / steps)});
+  }
+  if (points.size() > 1) {
+    for (const Pose2& p : test::drive(points, kRate_hz)) poses.push_back(p);
+  }
+  return poses;
+}
+
+struct Start {
+  Pose2 pose;
+  std::vector<Point2> drive;
+};
+const std::vector<Start> kUniqueStarts = {
+    {{3.5, 3.0, 0.4}, {{3.5, 3.0}, {3.5, 8.0}}},       {{10.5, 5.0, 2.0}, {{10.5, 5.0}, {10.5, 8.0}}},
+    {{20.5, 5.0, -1.0}, {{20.5, 5.0}, {19.5, 8.0}}},   {{5.5, 13.8, -2.0}, {{5.5, 13.8}, {6.0, 10.0}}},
+    {{13.8, 13.5, 1.2}, {{13.8, 13.5}, {13.8, 10.0}}}, {{19.0, 10.5, 3.0}, {{19.0, 10.5}, {17.5, 10.5}}}};
+
+TEST(LocalizerGlobal, FindsUniquePlacesWithoutAHint) {
+  const Building office = test::office();
+  const DistanceMap map = office.distance_map();
+  for (const Start& start : kUniqueStarts) {
+    SCOPED_TRACE(testing::Message() << "from " << start.pose.x_m << " " << start.pose.y_m);
+    Localizer localizer{LocalizerConfig()};
+    localizer.set_map(map);
+    const auto truth = spin_and_drive(start.pose, start.drive);
+    const auto odometry = test::odometry_of(truth, 1.02, 0.98);
+    double found_s = -1.0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      const LocalizerResult& r = localizer.update(swept_scan(office, truth, 0, i), Pose2(), odometry[i], 1);
+      const double error = distance_m(r.T_map_base, truth[i]);
+      if (r.verdict == V::kOk) {
+        if (found_s < 0.0) found_s = static_cast<double>(i) / kRate_hz;
+        EXPECT_LT(error, 0.5) << "ok while wrong at " << r.stamp_s << " s";
+      }
+    }
+    const LocalizerResult& r = localizer.result();
+    std::printf("found after %.1f s; at the end %.3f m off, %s: %s\n", found_s,
+                distance_m(r.T_map_base, truth.back()), verdict_name(r.verdict), r.reason.c_str());
+    EXPECT_EQ(r.verdict, V::kOk) << r.reason;
+    EXPECT_LT(distance_m(r.T_map_base, truth.back()), 0.15);
+    EXPECT_LT(std::fabs(normalize_angle_rad(r.T_map_base.yaw_rad - truth.back().yaw_rad)), 0.05);
+  }
+}
+
+TEST(LocalizerGlobal, TwinRoomsAreUncertainUntilTheLaneTellsThemApart) {
+  const Building twins = test::twin_rooms();
+  Localizer localizer{LocalizerConfig()};
+  localizer.set_map(twins.distance_map());
+  const auto truth =
+      spin_and_drive({9.0, 5.0, 1.0}, {{9.0, 5.0}, {9.0, 5.2}, {9.0, 1.6}, {6.0, 1.6}, {4.0, 2.0}});
+  const auto odometry = test::odometry_of(truth, 1.02, 0.98);
+  int ok_in_room = 0, uncertain_in_room = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const LocalizerResult& r = localizer.update(swept_scan(twins, truth, 0, i), Pose2(), odometry[i], 1);
+    if (truth[i].y_m > 3.8) {
+      ok_in_room += r.verdict == V::kOk;
+      uncertain_in_room += r.verdict == V::kUncertain;
+    }
+    if (r.verdict == V::kOk) {
+      EXPECT_LT(distance_m(r.T_map_base, truth[i]), 0.5) << r.stamp_s;
+    }
+  }
+  EXPECT_EQ(ok_in_room, 0);
+  EXPECT_GT(uncertain_in_room, 50);
+  EXPECT_EQ(localizer.result().verdict, V::kOk) << localizer.result().reason;
+  EXPECT_LT(distance_m(localizer.result().T_map_base, truth.back()), 0.15);
+}
+
+TEST(LocalizerRecovery, KidnappedWithANewEpochComesBack) {
+  const Building office = test::office();
+  Localizer localizer{LocalizerConfig()};
+  localizer.set_map(office.distance_map());
+  const auto first = spin_and_drive({3.5, 3.0, 0.0}, {{3.5, 3.0}, {3.5, 6.0}});
+  const auto second = spin_and_drive({20.5, 5.0, 2.0}, {{20.5, 5.0}, {19.5, 8.0}, {15.0, 8.0}});
+  localizer.initialize(first[0], Eigen::Vector3d(0.04, 0.04, 0.01).asDiagonal());
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    localizer.update(make_scan(office, first[i], kinect(0), static_cast<double>(i) / kRate_hz), Pose2(),
+                     first[i], 1);
+  }
+  ASSERT_EQ(localizer.result().verdict, V::kOk) << localizer.result().reason;
+  const double start_s = static_cast<double>(first.size()) / kRate_hz;
+  double back_s = -1.0;
+  for (std::size_t i = 0; i < second.size(); ++i) {
+    RangeScan scan = swept_scan(office, second, 0, i);
+    scan.stamp_s += start_s;
+    const LocalizerResult& r = localizer.update(scan, Pose2(), second[i], 2);
+    if (r.verdict == V::kOk) {
+      EXPECT_LT(distance_m(r.T_map_base, second[i]), 0.5) << "ok while wrong at " << r.stamp_s - start_s;
+      if (back_s < 0.0) back_s = r.stamp_s - start_s;
+    }
+  }
+  std::printf("back after %.1f s\n", back_s);
+  EXPECT_EQ(localizer.result().verdict, V::kOk) << localizer.result().reason;
+  EXPECT_LT(distance_m(localizer.result().T_map_base, second.back()), 0.15);
+}
+
+TEST(LocalizerRecovery, KidnappedWithoutNoticeIsLostThenComesBack) {
+  const Building office = test::office();
+  Localizer localizer{LocalizerConfig()};
+  localizer.set_map(office.distance_map());
+  const auto first = spin_and_drive({3.5, 3.0, 0.0}, {{3.5, 3.0}, {3.5, 6.0}});
+  const auto second = spin_and_drive({13.8, 13.5, 2.0}, {{13.8, 13.5}, {13.8, 8.0}, {11.0, 8.0}});
+  localizer.initialize(first[0], Eigen::Vector3d(0.04, 0.04, 0.01).asDiagonal());
+  ScanModel laser;
+  laser.rays = 1440;
+  laser.noise_m = 0.02;
+  double t = 0.0;
+  for (const Pose2& pose : first)
+    localizer.update(make_scan(office, pose, laser, t += 1.0 / kRate_hz), Pose2(), pose, 1);
+  ASSERT_EQ(localizer.result().verdict, V::kOk) << localizer.result().reason;
+  const double start_s = t;
+  const Pose2 T_local_map = first.back() * second.front().inverse();
+  double doubted_s = -1.0, back_s = -1.0;
+  for (const Pose2& pose : second) {
+    const LocalizerResult& r =
+        localizer.update(make_scan(office, pose, laser, t += 1.0 / kRate_hz), Pose2(), T_local_map * pose, 1);
+    if (r.verdict != V::kOk && doubted_s < 0.0) doubted_s = t - start_s;
+    if (r.verdict == V::kOk && doubted_s >= 0.0) {
+      EXPECT_LT(distance_m(r.T_map_base, pose), 0.5);
+      if (back_s < 0.0) back_s = t - start_s;
+    }
+  }
+  std::printf("doubted after %.1f s, back after %.1f s\n", doubted_s, back_s);
+  EXPECT_GE(doubted_s, 0.0);
+  EXPECT_LT(doubted_s, 5.0);
+  EXPECT_EQ(localizer.result().verdict, V::kOk) << localizer.result().reason;
+  EXPECT_LT(distance_m(localizer.result().T_map_base, second.back()), 0.15);
+}
+
+TEST(LocalizerRecovery, AWrongInitialPoseIsNotedAndLeft) {
+  const Building office = test::office();
+  Localizer localizer{LocalizerConfig()};
+  localizer.set_map(office.distance_map());
+  const auto truth = spin_and_drive({20.5, 5.0, 2.0}, {{20.5, 5.0}, {19.5, 8.0}});
+  localizer.initialize({5.5, 13.8, 0.0}, Eigen::Vector3d(0.25, 0.25, 0.07).asDiagonal());
+  int ok_while_wrong = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const double t = static_cast<double>(i) / kRate_hz;
+    const auto& r = localizer.update(make_scan(office, truth[i], kinect(0), t), Pose2(), truth[i], 1);
+    ok_while_wrong += r.verdict == V::kOk && distance_m(r.T_map_base, truth[i]) > 0.5;
+  }
+  EXPECT_LE(ok_while_wrong, 1);
+  EXPECT_EQ(localizer.result().verdict, V::kOk) << localizer.result().reason;
+  EXPECT_LT(distance_m(localizer.result().T_map_base, truth.back()), 0.15);
+}
+
+TEST(LocalizerGlobal, NoUpdateOfASearchTakesLong) {
+  // 60 x 60 m: the office, again and again, mirrored in one place by a block
+  Building large;
+  large.width_m = large.height_m = 60.0;
+  for (const double x : {0.0, 30.0}) {
+    for (const double y : {0.0, 20.0, 40.0}) {
+      for (const test::Block& b : test::office().blocks) {
+        large.wall(b.x0_m + x, b.y0_m + y, b.x1_m + x, b.y1_m + y);
+      }
+    }
+  }
+  Localizer localizer{LocalizerConfig()};
+  localizer.set_map(large.distance_map(0.1));
+  const Pose2 pose{33.5, 3.0, 0.3};
+  double worst_ms = 0.0;
+  int updates = 0;
+  while (!localizer.result().has_pose && updates < 300) {
+    const RangeScan scan = make_scan(large, pose, kinect(0), updates++ / 30.0);
+    const auto begin = std::chrono::steady_clock::now();
+    localizer.update(scan, Pose2(), Pose2(), 1);
+    worst_ms =
+        std::max(worst_ms,
+                 std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+  }
+  std::printf("%d updates, the longest %.1f ms\n", updates, worst_ms);
+  EXPECT_LT(updates, 150);     // 5 s
+  EXPECT_LT(worst_ms, 300.0);  // 30 ms on an idle machine; a loaded one must not fail the test
+  EXPECT_EQ(localizer.result().verdict, V::kUncertain);  // six copies of the place
+}
+
+}  // namespace
+}  // namespace knav

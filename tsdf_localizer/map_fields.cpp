@@ -1,0 +1,105 @@
+#include "tsdf_localizer/map_fields.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/distance_transform.h"
+#include "core/error.h"
+
+namespace knav {
+namespace {
+
+constexpr double kCoarseCell_m = 0.1;
+
+double price(float distance_m, double truncation_m, double unknown_cost) {
+  return std::isfinite(distance_m) ? std::min(1.0, std::fabs(distance_m) / truncation_m) : unknown_cost;
+}
+
+CostField fine_field(const DistanceMap& map, const MeasurementConfig& config) {
+  CostField field(map.geometry, config.unknown_cost);
+  for (int iy = 0; iy < map.geometry.height_cells; ++iy) {
+    for (int ix = 0; ix < map.geometry.width_cells; ++ix) {
+      field.set(ix, iy, price(map.at(ix, iy), config.truncation_m, config.unknown_cost));
+    }
+  }
+  return field;
+}
+
+CostField coarse_field(const DistanceMap& map, double truncation_m, double unknown_cost) {
+  const GridGeometry& fine = map.geometry;
+  const int factor = std::max(1, static_cast<int>(std::lround(kCoarseCell_m / fine.resolution_m)));
+  GridGeometry coarse = fine;
+  coarse.resolution_m = fine.resolution_m * factor;
+  coarse.width_cells = (fine.width_cells + factor - 1) / factor;
+  coarse.height_cells = (fine.height_cells + factor - 1) / factor;
+  CostField field(coarse, unknown_cost);
+  for (int iy = 0; iy < coarse.height_cells; ++iy) {
+    for (int ix = 0; ix < coarse.width_cells; ++ix) {
+      field.set(
+          ix, iy,
+          price(map.at(ix * factor + factor / 2, iy * factor + factor / 2), truncation_m, unknown_cost));
+    }
+  }
+  return field;
+}
+
+std::vector<Point2> free_positions(const DistanceMap& map, const GlobalSearchConfig& config) {
+  const GridGeometry& grid = map.geometry;
+  std::vector<Point2> positions;
+  const int columns =
+      std::max(1, static_cast<int>(std::ceil(grid.width_cells * grid.resolution_m / config.step_m)));
+  const int rows =
+      std::max(1, static_cast<int>(std::ceil(grid.height_cells * grid.resolution_m / config.step_m)));
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      const Point2 p{grid.origin_x_m + (column + 0.5) * config.step_m,
+                     grid.origin_y_m + (row + 0.5) * config.step_m};
+      const float distance_m = map.nearest(p.x_m, p.y_m);
+      if (distance_m > config.clearance_m) positions.push_back(p);  // false for NaN: unknown is never free
+    }
+  }
+  return positions;
+}
+
+}  // namespace
+
+MapFields make_map_fields(const DistanceMap& map, const MeasurementConfig& measurement,
+                          const GlobalSearchConfig& search) {
+  const GridGeometry& grid = map.geometry;
+  if (grid.width_cells <= 0 || grid.height_cells <= 0 || !(grid.resolution_m > 0.0)) {
+    throw UserError("map: it has no cells, or a resolution that is not above 0; build or load another one.");
+  }
+  if (map.distance_m.size() != grid.cell_count()) {
+    throw UserError("map: the number of its values is not width x height; build or load another one.");
+  }
+  return {map, fine_field(map, measurement), coarse_field(map, search.truncation_m, measurement.unknown_cost),
+          free_positions(map, search)};
+}
+
+DistanceMap distance_map_from_occupancy(const OccupancyGrid& grid) {
+  constexpr int kOccupiedFrom = 65, kFreeTo = 25;
+  if (grid.value.size() != grid.geometry.cell_count()) {
+    throw UserError("map: the number of its values is not width x height; build or load another one.");
+  }
+  std::vector<std::uint8_t> occupied(grid.value.size()), open(grid.value.size());
+  for (std::size_t i = 0; i < grid.value.size(); ++i) {
+    occupied[i] = grid.value[i] >= kOccupiedFrom;
+    open[i] = !occupied[i];
+  }
+  const std::vector<float> to_wall = euclidean_distance_m(grid.geometry, occupied);
+  const std::vector<float> to_open = euclidean_distance_m(grid.geometry, open);
+  DistanceMap map;
+  map.geometry = grid.geometry;
+  map.distance_m.resize(grid.value.size());
+  const auto half_cell = static_cast<float>(grid.geometry.resolution_m / 2.0);
+  for (std::size_t i = 0; i < grid.value.size(); ++i) {
+    const int value = grid.value[i];
+    map.distance_m[i] = occupied[i]                      ? half_cell - to_open[i]
+                        : value >= 0 && value <= kFreeTo ? to_wall[i] - half_cell
+                                                         : std::numeric_limits<float>::quiet_NaN();
+  }
+  return map;
+}
+
+}  // namespace knav

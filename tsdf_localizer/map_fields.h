@@ -1,0 +1,31 @@
+#pragma once
+
+#include <vector>
+
+#include "core/cost_field.h"
+#include "core/distance_map.h"
+#include "core/grid_geometry.h"
+#include "core/pose2.h"
+#include "tsdf_localizer/localizer_config.h"
+
+namespace knav {
+
+/// What the localizer reads of a map, made once when the map comes.
+struct MapFields {
+  DistanceMap map;
+  CostField fine;    ///< |distance| / truncation at the map's own resolution, for the filter
+  CostField coarse;  ///< in cells of about 0.1 m and with a wider truncation, small enough for the cache:
+                     ///< first search
+  std::vector<Point2> search_positions;  ///< free places on the search's grid
+};
+
+/// UserError if the map is empty, or its size and data disagree.
+MapFields make_map_fields(const DistanceMap& map, const MeasurementConfig& measurement,
+                          const GlobalSearchConfig& search);
+
+/// A signed distance map from a plain occupancy grid (map_server's): occupied from 65 up, free to 25, else
+/// unknown, as map_server's default thresholds. The wall's surface lies half a cell before the centre of an
+/// occupied cell.
+DistanceMap distance_map_from_occupancy(const OccupancyGrid& grid);
+
+}  // namespace knav

@@ -1,0 +1,79 @@
+#include "tsdf_localizer/pose_check.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace knav {
+namespace {
+
+constexpr float kFreshEvidence = 0.8f;
+constexpr std::uint32_t kFreshRaysMin = 30;
+
+/// True if the segment from the sensor meets a surface more than `slack_m` before its end. Sphere tracing:
+/// the map's own value says how far no surface can be. Ends at the first unknown cell, of which nothing can
+/// be said.
+bool meets_wall(const DistanceMap& map, const Point2& from, const Point2& to, double length_m,
+                double slack_m) {
+  const GridGeometry& grid = map.geometry;
+  const double step_min_m = 0.5 * grid.resolution_m;
+  const double ux = (to.x_m - from.x_m) / length_m, uy = (to.y_m - from.y_m) / length_m;
+  const double end_m = length_m - slack_m;
+  double s = 0.0;
+  while (s < end_m) {
+    const double distance_m = map.nearest(from.x_m + s * ux, from.y_m + s * uy);
+    if (!(distance_m >= 0.0)) return distance_m < 0.0;
+    // less a cell, as the value is the nearest cell centre's
+    s += std::max(step_min_m, distance_m - grid.resolution_m);
+  }
+  return false;
+}
+
+}  // namespace
+
+double support_of(std::uint32_t explained, std::uint32_t in_front, std::uint32_t through) {
+  const std::uint32_t judged = explained + in_front + through;
+  return judged > 0 ? (explained + 0.5 * in_front) / judged : 1.0;
+}
+
+PoseCheck check_pose(const DistanceMap& map, const ScanRays& rays, const Pose2& T_map_base,
+                     const MeasurementConfig& measurement, const HealthConfig& health) {
+  PoseCheck check;
+  const Pose2 T_map_sensor = T_map_base * rays.T_base_sensor;
+  const Point2 from{T_map_sensor.x_m, T_map_sensor.y_m};
+  const double c = std::cos(T_map_base.yaw_rad), s = std::sin(T_map_base.yaw_rad);
+  std::uint32_t fresh_explained = 0, fresh_in_front = 0, fresh_through = 0;
+  double cost = 0.0, weight = 0.0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const double px = rays.points.x_m[i], py = rays.points.y_m[i], range_m = rays.range_m[i];
+    const Point2 to{T_map_base.x_m + c * px - s * py, T_map_base.y_m + s * px + c * py};
+    const double distance_m = std::fabs(map.nearest(to.x_m, to.y_m));
+    const double near_m = health.explained_m + health.explained_per_range * range_m;
+    // a glancing ray meets a wall long before its end though the pose is only a little off: hence slack with
+    // range
+    const bool through = meets_wall(map, from, to, range_m, 2.0 * health.explained_m + 0.1 * range_m);
+    const bool fresh = rays.evidence[i] >= kFreshEvidence;
+    double price = measurement.unknown_cost;
+    if (through) {
+      price = 1.0;
+      ++check.through;
+      fresh_through += fresh;
+    } else if (!std::isfinite(distance_m)) {
+      ++check.unknown;
+    } else {
+      price = std::min(1.0, distance_m / measurement.truncation_m);
+      const bool explained = distance_m <= near_m;
+      (explained ? check.explained : check.in_front) += 1;
+      if (fresh) (explained ? fresh_explained : fresh_in_front) += 1;
+    }
+    cost += rays.points.weight[i] * price;
+    weight += rays.points.weight[i];
+  }
+  if (weight > 0.0) check.cost = cost / weight;
+  check.support = support_of(check.explained, check.in_front, check.through);
+  if (fresh_explained + fresh_in_front + fresh_through >= kFreshRaysMin) {
+    check.fresh_support = support_of(fresh_explained, fresh_in_front, fresh_through);
+  }
+  return check;
+}
+
+}  // namespace knav

@@ -1,0 +1,125 @@
+#include "tsdf_localizer/pose_search.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace knav {
+
+PoseSearch::PoseSearch(const LocalizerConfig& config)
+    : config_(config), search_(config.global_search, config.measurement, config.health) {}
+
+void PoseSearch::doubt(Prior prior, const std::string& why) {
+  in_doubt_ = true;
+  prior_ = prior;
+  why_ = why;
+  agreements_ = defeats_ = 0;
+  any_search_ = false;
+  search_.cancel();
+}
+
+void PoseSearch::cut() {
+  search_.cancel();
+  any_search_ = false;
+}
+
+void PoseSearch::move(const Pose2& T_before_after) {
+  T_start_now_ = T_start_now_ * T_before_after;
+  distance_m_ += std::hypot(T_before_after.x_m, T_before_after.y_m);
+  turn_rad_ += std::fabs(T_before_after.yaw_rad);
+}
+
+bool PoseSearch::due(double stamp_s) const {
+  const GlobalSearchConfig& c = config_.global_search;
+  return !any_search_ || distance_m_ >= c.repeat_after_m || turn_rad_ >= c.repeat_after_rad ||
+         stamp_s - started_s_ >= c.repeat_after_s || stamp_s < started_s_;
+}
+
+bool PoseSearch::update(double stamp_s, const MapFields& fields, const ScanRays& rays,
+                        const Pose2& T_filter_now, Belief* belief) {
+  if (!config_.global_search.enabled || !in_doubt_) return false;
+  if (!search_.running()) {
+    if (!due(stamp_s) || rays.size() < static_cast<std::size_t>(config_.health.rays_min)) return false;
+    std::vector<Pose2> seeds;
+    if (!belief->empty()) seeds.push_back(belief->estimate().pose.mean * T_filter_now);
+    search_.start(fields, rays, seeds);
+    T_start_now_ = Pose2();
+    distance_m_ = turn_rad_ = 0.0;
+    started_s_ = stamp_s;
+    any_search_ = true;
+  }
+  return search_.step(fields) && judge(fields, T_filter_now, belief);
+}
+
+bool PoseSearch::judge(const MapFields& fields, const Pose2& T_filter_now, Belief* belief) {
+  if (search_.hypotheses().empty()) {
+    why_ = "no place of the map fits the scan";
+    agreements_ = 0;
+    return false;
+  }
+  const double margin = config_.global_search.ambiguity_margin;
+  const double best_cost = search_.hypotheses().front().cost;
+  now_.clear();
+  for (const Hypothesis& h : search_.hypotheses()) {
+    if (h.cost > best_cost + 2.0 * margin && !now_.empty()) break;
+    now_.push_back(h);
+    now_.back().T_map_base = h.T_map_base * T_start_now_ * T_filter_now.inverse();
+  }
+  const double temperature = 0.5 * margin + 1e-6;
+  if (belief->empty()) {
+    belief->inject(now_, 1.0, temperature);
+    why_ = now_.size() > 1 ? fmt::format("{} places fit the scan", now_.size())
+                           : "found by search, to be confirmed";
+    return true;
+  }
+  const Pose2 estimate = belief->estimate().pose.mean;
+  const Hypothesis* mine = nullptr;
+  const Hypothesis* rival = nullptr;
+  int as_good = 0;
+  for (const Hypothesis& h : search_.hypotheses()) {
+    const Pose2 T = h.T_map_base * T_start_now_ * T_filter_now.inverse();
+    if (same_place(T, estimate)) {
+      if (!mine) mine = &h;
+    } else {
+      if (!rival) rival = &h;
+      as_good += h.cost <= best_cost + margin;
+    }
+  }
+  const double my_cost = mine ? mine->cost : 1.0, rival_cost = rival ? rival->cost : 1.0;
+  const double lead = rival_cost - my_cost;
+  const double needed = prior_ == Prior::kNone ? margin : prior_ == Prior::kLocal ? margin / 3.0 : -margin;
+  if (mine && lead >= needed) {
+    defeats_ = 0;
+    if (mine->support < config_.health.ok_fraction) {
+      agreements_ = 0;
+      why_ = fmt::format("the best place found explains only {:.0f} % of the scan", 100.0 * mine->support);
+      return false;
+    }
+    if (++agreements_ >= 2 || lead > 3.0 * margin) {
+      in_doubt_ = false;
+    } else {
+      why_ = "the place fits, to be confirmed";
+    }
+    return false;
+  }
+  agreements_ = 0;
+  if (mine && lead >= 0.0) {
+    defeats_ = 0;
+    why_ = fmt::format("{} other place(s) of the map fit the scan as well", as_good);
+    return false;
+  }
+  // Another place is better. A little: let the filter decide. Clearly, and twice: move there.
+  const bool clearly = lead < -margin;
+  defeats_ = clearly ? defeats_ + 1 : 0;
+  const double fraction = !clearly ? 0.3 : defeats_ >= 2 ? 0.95 : 0.5;
+  belief->inject(now_, fraction, temperature);
+  if (clearly && prior_ == Prior::kGiven) prior_ = Prior::kLocal;
+  if (clearly && defeats_ >= 2) prior_ = Prior::kNone;
+  why_ = clearly ? "another place of the map fits the scan better"
+                 : fmt::format("{} other place(s) of the map fit the scan as well", as_good);
+  (void)fields;
+  return true;
+}
+
+}  // namespace knav
