@@ -37,10 +37,10 @@ struct ObservationReaderConfig {
     v.text("scan_topic", scan_topic, "sensor_msgs/LaserScan.");
     v.text("depth_topic", depth_topic, "sensor_msgs/Image, 16UC1 mm or 32FC1 m.");
     v.text("camera_info_topic", camera_info_topic, "sensor_msgs/CameraInfo of the depth images.");
-    v.text("odometry_topic", odometry_topic, "nav_msgs/Odometry; without it, TF from odom to the base is used.");
+    v.text("odometry_topic", odometry_topic, "nav_msgs/Odometry.");
     v.text("mark_topic", mark_topic, "std_msgs/Empty: the robot stands at a marked place.");
     v.text("joy_topic", joy_topic, "sensor_msgs/Joy, whose button mark_button means the same.");
-    v.text("base_frame", base_frame, "The robot's frame; overridden by the odometry's child_frame_id.");
+    v.text("base_frame", base_frame, "The robot's frame, where the odometry names none (child_frame_id).");
     v.integer("mark_button", mark_button, 0, 31, "", "Index of the joystick's button that marks a place.");
     v.number("reorder_s", reorder_s, 0.0, 10.0, "s", "How late a message may come and still be put in order.");
     v.number("odometry_ahead_s", odometry_ahead_s, 0.0, 1.0, "s",
