@@ -79,6 +79,29 @@ struct ContinuityConfig {
   }
 };
 
+/// What only the nodelet uses.
+struct LocalMapperRosConfig {
+  std::string base_frame = "base_link";
+  std::string odom_frame = "odom";
+  std::string local_map_frame = "local_map";
+  bool publish_tf = true;
+  double local_map_rate_hz = 5.0;
+  double particlecloud_rate_hz = 2.0;
+  int frames_waiting = 5;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.text("base_frame", base_frame, "The robot's frame.");
+    v.text("odom_frame", odom_frame, "Odometry's frame, parent of local_map.");
+    v.text("local_map_frame", local_map_frame, "The frame of local_map and motion_estimate.");
+    v.flag("publish_tf", publish_tf, "Publish the leaf odom -> local_map.");
+    v.number("local_map_rate_hz", local_map_rate_hz, 0.1, 100, "Hz", "local_map, at most.");
+    v.number("particlecloud_rate_hz", particlecloud_rate_hz, 0.1, 100, "Hz", "local_particlecloud, at most.");
+    v.integer("frames_waiting", frames_waiting, 1, 100, "frames",
+              "Frames that wait for odometry to cover their stamp; the oldest is dropped when there are more.");
+  }
+};
+
 struct LocalMapperConfig {
   int seed = 1;
   double range_min_m = 0.3;
@@ -92,6 +115,7 @@ struct LocalMapperConfig {
   MotionModelConfig motion;
   ContourConfig contour;
   ContinuityConfig continuity;
+  LocalMapperRosConfig ros;
 
   LocalMapperConfig();
 
@@ -111,6 +135,7 @@ struct LocalMapperConfig {
     v.group("motion", motion, "How wrong odometry may be.");
     v.group("contour", contour, "The virtual 360-degree scan.");
     v.group("continuity", continuity, "Gaps, jumps and being carried.");
+    v.group("ros", ros, "Frames and rates of the nodelet; no effect offline.");
   }
   /// One sentence per fault, empty if none.
   std::vector<std::string> validate() const;
