@@ -8,17 +8,18 @@
 
 namespace knav {
 
-/// Distances to what stands in a building: a coarse grid rejects most questions, the prisms answer the rest exactly.
+/// Distances to what stands in a building. A coarse grid names the prisms near a point; they answer exactly.
 class CollisionMap {
  public:
+  /// @param world must outlive this object
   /// @param height_m what begins above this is passed under
   CollisionMap(const WorldConfig& world, double height_m);
 
-  /// Distance [m] from a point to the nearest solid, doors and timed pieces in their present state included; exact
-  /// up to `near_m`, beyond that a lower bound that is at least near_m.
-  double clearance_m(const Point2& point, double near_m) const;
-  /// True if a wheel of a robot of this radius would be over a stair.
-  bool over_stairs(const Point2& point, double radius_m) const;
+  /// Distance [m] from a point to the nearest solid, doors and timed pieces as last set included; exact up to
+  /// 0.75 m, and never more than that.
+  double clearance_m(const Point2& point) const;
+  /// True if a wheel of a robot with wheels this far from its centre would be over a stair.
+  bool over_stairs(const Point2& point, double wheel_m) const;
   void set_doors(const std::vector<double>& door_open_rad);
   void set_timed(const std::vector<char>& present);
 
@@ -28,10 +29,8 @@ class CollisionMap {
   const WorldConfig* world_;
   double height_m_;
   std::vector<Solid> solids_;
-  GridGeometry geometry_;
-  std::vector<float> grid_distance_m_;
-  std::vector<std::vector<std::size_t>> bucket_;  ///< solids near each coarse cell
   GridGeometry bucket_geometry_;
+  std::vector<std::vector<std::size_t>> bucket_;  ///< solids near each cell
   std::vector<Solid> doors_, timed_;
   std::vector<char> timed_present_;
 };

@@ -14,30 +14,33 @@ struct KinectConfig {
   double baseline_m = 0.075;
   double focal_px = 585.0;
   double min_range_m = 0.5;
-  double saturation_m = 20.0;      ///< beyond this anything may come
-  double max_range_m = 26.0;       ///< largest value given out
+  double saturation_m = 20.0;  ///< beyond this anything may come
+  double max_range_m = 26.0;   ///< largest value given out
   bool quantize = true;
-  double noise_codes = 0.55;       ///< sd of the quantised readings; 0 = none
-  double offset_at_10m = 0.10;     ///< largest relative error at 10 m of the device's ring-shaped disparity offset
-  double band_codes = 0.25;        ///< amplitude of the vertical bands
-  bool shadow = true;              ///< pixels the projector does not light
-  double dropout_signal = 0.02;    ///< signal below which a pixel gives nothing; 0 = never
+  double noise_codes = 0.55;  ///< sd of the quantised readings; 0 = none
+  double offset_at_10m =
+      0.10;                  ///< largest relative error at 10 m of the device's ring-shaped disparity offset
+  double band_codes = 0.25;  ///< amplitude of the vertical bands
+  bool shadow = true;        ///< pixels the projector does not light
+  double dropout_signal = 0.02;  ///< signal below which a pixel gives nothing; 0 = never
 
-  /// ideal: exact depth; calibrated: what a calibration leaves; default: a device as bought; harsh: a bad one.
+  /// ideal: exact depth; calibrated: what a calibration leaves; default: a device as bought; harsh: a bad
+  /// one.
   static KinectConfig preset(const std::string& name);
   static const std::vector<std::string>& preset_names();
 };
 
 /// One image row of the true scene, before the sensor.
 struct TrueRow {
-  float* z_m = nullptr;      ///< along the optical axis; +Inf = nothing there
-  float* signal = nullptr;   ///< albedo x cosine of incidence, before the fall with range
+  float* z_m = nullptr;     ///< along the optical axis; +Inf = nothing there
+  float* signal = nullptr;  ///< albedo x cosine of incidence, before the fall with range
 };
 
 /// Turns true depth rows into what the sensor says. Deterministic by (seed, frame, row).
 class KinectModel {
  public:
-  KinectModel(const KinectConfig& config, const PinholeModel& camera, std::uint64_t seed, std::uint64_t device_seed);
+  KinectModel(const KinectConfig& config, const PinholeModel& camera, std::uint64_t seed,
+              std::uint64_t device_seed);
 
   void start_frame(std::uint64_t frame_index, double stamp_s);
   /// @param depth_mm one row of the output, 0 = invalid
@@ -48,16 +51,16 @@ class KinectModel {
   const KinectConfig& config() const { return config_; }
 
  private:
-  void make_noise(std::uint64_t seed);
   void make_offset(std::uint64_t device_seed);
-  void find_shadow(const float* disparity_px);
+  void mark_lit(const float* codes);
 
   KinectConfig config_;
   PinholeModel camera_;
   std::uint64_t seed_, device_seed_;
   cv::Mat offset_px_, offset_codes_;
   std::vector<std::int16_t> noise_, texture_;
-  std::vector<float> band_codes_, disparity_px_, projector_px_, shadow_;
+  std::vector<float> band_codes_, codes_;
+  std::vector<float> lit_codes_;  ///< nearest disparity [codes] per projector column
   std::uint32_t noise_column_ = 0, noise_row_ = 0, texture_column_ = 0, texture_row_ = 0;
 };
 

@@ -22,8 +22,8 @@ struct DynamicState {
   std::vector<char> timed_solid_present;
 };
 
-/// Walkers who follow their scripts, keep off walls and each other, and stop for the robot or walk round it; they
-/// never walk into it by themselves.
+/// Walkers who follow their scripts, keep off walls and each other, and stop for the robot or walk round it;
+/// they never walk into it by themselves.
 class People {
  public:
   People(const std::vector<PersonConfig>& configs, const CollisionMap& map);
@@ -43,8 +43,8 @@ class People {
     double side = 0.0;  ///< the side last chosen to pass the robot, +1 left
     bool finished = false;
   };
-  void step_one(std::size_t i, double t_s, double dt_s, const Pose2& robot, double robot_v, double robot_radius,
-                std::vector<PersonState>* state);
+  void step_one(std::size_t i, double t_s, double dt_s, const Pose2& robot, double robot_v,
+                double robot_radius, std::vector<PersonState>* state);
   void next_target(std::size_t i, double t_s);
 
   std::vector<PersonConfig> configs_;

@@ -26,7 +26,8 @@ struct RobotConfig {
     v.number("max_speed_mps", max_speed_mps, 0.05, 3, "m/s", "Commands are cut to this.");
     v.number("max_turn_radps", max_turn_radps, 0.1, 10, "rad/s", "Commands are cut to this.");
     v.number("acceleration_mps2", acceleration_mps2, 0.05, 10, "m/s^2", "Limit, also when braking.");
-    v.number("turn_acceleration_radps2", turn_acceleration_radps2, 0.1, 50, "rad/s^2", "Limit, also when braking.");
+    v.number("turn_acceleration_radps2", turn_acceleration_radps2, 0.1, 50, "rad/s^2",
+             "Limit, also when braking.");
     v.number("slip", slip, 0, 0.2, "", "Share (sd) of the commanded speed that the wheels lose or gain.");
     v.number("command_timeout_s", command_timeout_s, 0.05, 60, "s", "Without a new command the robot stops.");
   }
@@ -35,11 +36,11 @@ struct RobotConfig {
 
 /// How odometry departs from the truth: systematic errors that the device seed gives a sign, and random ones.
 struct OdometryErrors {
-  double distance_scale = 0.0;         ///< relative
-  double turn_scale = 0.0;             ///< relative
+  double distance_scale = 0.0;  ///< relative
+  double turn_scale = 0.0;      ///< relative
   double turn_per_distance_radpm = 0.0;
-  double distance_noise = 0.0;         ///< sd [m] after 1 m, growing with the root of the distance
-  double turn_noise_rad = 0.0;         ///< sd [rad] after 1 m
+  double distance_noise = 0.0;           ///< sd [m] after 1 m, growing with the root of the distance
+  double turn_noise_rad = 0.0;           ///< sd [rad] after 1 m
   double turn_noise_per_turn_rad = 0.0;  ///< sd [rad] after 1 rad
 
   /// default: a few per cent; bad: as mit_csail, 9 deg in 5 m; perfect: none.
@@ -50,7 +51,8 @@ struct OdometryErrors {
 /// Truth and odometry of the base. Deterministic by seed.
 class RobotModel {
  public:
-  RobotModel(const RobotConfig& config, const OdometryErrors& errors, std::uint64_t seed, std::uint64_t device_seed);
+  RobotModel(const RobotConfig& config, const OdometryErrors& errors, std::uint64_t seed,
+             std::uint64_t device_seed);
 
   void set_command(double v_mps, double w_radps);
   /// Where the next step would take the robot; advance() or stay() must follow.
@@ -60,7 +62,10 @@ class RobotModel {
   /// Blocked: turns, but does not move on; the wheels stall.
   void stay();
 
-  void set_pose(const Pose2& T_world_base) { T_world_base_ = T_world_base; v_mps_ = w_radps_ = 0.0; }
+  void set_pose(const Pose2& T_world_base) {
+    T_world_base_ = T_world_base;
+    v_mps_ = w_radps_ = 0.0;
+  }
   const Pose2& T_world_base() const { return T_world_base_; }
   const Pose2& T_odom_base() const { return T_odom_base_; }
   double v_mps() const { return v_mps_; }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -23,10 +24,10 @@ namespace knav {
 /// What was where while one depth frame was read out; enough to render it later or in another thread.
 struct FrameRequest {
   std::uint64_t index = 0;
-  double stamp_s = 0.0;              ///< when the row `stamp_row` is read
+  double stamp_s = 0.0;                       ///< when the row `stamp_row` is read
   std::array<StampedPose2, 16> T_world_base;  ///< over the readout, sorted by stamp
   int pose_count = 0;
-  DynamicState dynamic;              ///< people, doors and timed pieces in mid-frame
+  DynamicState dynamic;  ///< people, doors and timed pieces in mid-frame
 
   Pose2 pose_at(double stamp_s) const;
 };
@@ -38,9 +39,9 @@ struct ContactCount {
   bool touching = false;              ///< now
 };
 
-/// The lock-step core: a robot, people and a Kinect in a building. Deterministic: the same world, configuration and
-/// sequence of commands give the same bytes. step(), set_command() and the queries belong to one thread; render()
-/// and scans may run in one other thread, as all they need is in the request.
+/// The lock-step core: a robot, people and a Kinect in a building. Deterministic: the same world,
+/// configuration and sequence of commands give the same bytes. step(), set_command() and the queries belong
+/// to one thread; render() and scans may run in one other thread, as all they need is in the request.
 class Simulator {
  public:
   Simulator(const WorldConfig& world, const SimulatorConfig& config);
@@ -55,7 +56,8 @@ class Simulator {
   Eigen::Isometry3d T_base_camera() const;
   Eigen::Isometry3d T_base_optical() const;
 
-  /// Forward [m/s] and turning [rad/s] speed wanted; holds until the next one or config().robot.command_timeout_s.
+  /// Forward [m/s] and turning [rad/s] speed wanted; holds until the next one or
+  /// config().robot.command_timeout_s.
   void set_command(double v_mps, double w_radps);
   /// Advances by config().step_s.
   void step();
@@ -91,7 +93,12 @@ class Simulator {
  private:
   struct Rendering;
   void move_doors();
-  void count_contacts(const Pose2& wanted, bool blocked);
+  /// Between the robot's rim and the nearest solid or person; negative = overlapping.
+  double gap_m(const Pose2& pose) const;
+  template <class Row>
+  void for_each_row(const FrameRequest& request, const Row& row);
+  void cast_scan(const FrameRequest& request, const Pose2& T_world_sensor, double height_m, int rays,
+                 RangeScan* scan);
 
   WorldConfig world_;
   SimulatorConfig config_;

@@ -8,9 +8,21 @@
 namespace knav {
 
 /// What a surface is made of, as far as a Kinect cares.
-enum class Material : std::uint8_t { kWall, kFloor, kCeiling, kWood, kFabric, kMetal, kDark, kPerson, kGlass, kSun };
+enum class Material : std::uint8_t {
+  kWall,
+  kFloor,
+  kCeiling,
+  kWood,
+  kFabric,
+  kMetal,
+  kDark,
+  kPerson,
+  kGlass,
+  kSun
+};
 
-/// Share of the projector's light that comes back, in [0, 1]; 0 for glass (seen through) and sun patches (blinding).
+/// Share of the projector's light that comes back, in [0, 1]; 0 for glass (seen through) and sun patches
+/// (blinding).
 double albedo(Material material);
 
 /// An upright convex prism: every wall piece, box, table leg and pillar of a world. Frame: world.

@@ -56,22 +56,23 @@ struct TimedSolid {
 struct WorldConfig {
   std::string file;
   std::string name;
-  double ceiling_m = 2.6;          ///< 0: no ceiling
-  std::vector<Solid> solids;       ///< always there; glass included
+  double ceiling_m = 2.6;     ///< 0: no ceiling
+  std::vector<Solid> solids;  ///< always there; glass included
   std::vector<TimedSolid> timed_solids;
   std::vector<DoorConfig> doors;
   std::vector<PersonConfig> people;
-  std::vector<FloorRect> stairs;   ///< holes in the floor
+  std::vector<FloorRect> stairs;  ///< holes in the floor
   std::vector<FloorRect> sun_patches;
   std::map<std::string, Pose2> places;
   Pose2 spawn;
-  FloorRect bounds;                ///< of everything, with a margin
+  FloorRect bounds;  ///< of everything, with a margin
 };
 
 /// UserError, one sentence with file and key, for anything unknown, malformed or contradictory.
 WorldConfig load_world(const std::string& path);
 /// The same from a text; `directory` resolves the files it names.
-WorldConfig parse_world(const std::string& text, const std::string& file_name, const std::string& directory = ".");
+WorldConfig parse_world(const std::string& text, const std::string& file_name,
+                        const std::string& directory = ".");
 
 /// Walls from an occupancy image: each occupied run of cells becomes a prism `height_m` high.
 /// @param grid value > 50 is occupied; its origin gives the place in the world
@@ -79,6 +80,9 @@ std::vector<Solid> extrude_occupancy(const OccupancyGrid& grid, double height_m)
 
 /// The leaf of a door at an opening angle.
 Solid door_leaf(const DoorConfig& door, double open_rad);
+
+/// Its opening angle at a time, by its schedule.
+double door_open_at(const DoorConfig& door, double t_s);
 
 /// The pieces that a robot or a person of this height touches, doors and timed pieces at time t included.
 std::vector<Solid> solids_at(const WorldConfig& world, double t_s);
