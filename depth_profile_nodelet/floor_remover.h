@@ -22,6 +22,8 @@ struct FloorRemovalConfig {
   double floor_range_m = 6.0;
   double view_near_m = 0.5;
   bool free_without_floor = false;
+  std::string base_frame = "base_link";
+  double tf_timeout_s = 0.1;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -38,6 +40,8 @@ struct FloorRemovalConfig {
     v.flag("free_without_floor", free_without_floor,
            "Take what the camera's own height sweeps as free although no floor is seen (a hand-held camera). "
            "Not for driving.");
+    v.text("base_frame", base_frame, "Nodelet: the TF frame whose z = 0 is the floor.");
+    v.number("tf_timeout_s", tf_timeout_s, 0, 1, "s", "Nodelet: how long a frame waits for the camera's TF.");
   }
   std::vector<std::string> validate() const {
     std::vector<std::string> faults;

@@ -54,7 +54,7 @@ void FrontEnd::process_rectified(const PinholeModel& camera, double stamp_s,
                                  const Eigen::Isometry3d& T_base_optical, const PoseBuffer& odometry,
                                  DepthProfile* out) {
   unrolled_how_ = rolling_shutter_.correct(rectified_, camera, stamp_s, odometry, &unrolled_);
-  floor_remover_.process(unrolled_, camera, stamp_s, T_base_optical, &sliced_, &floor_);
+  floor_remover_.process(unrolled(), camera, stamp_s, T_base_optical, &sliced_, &floor_);
   extractor_.extract(sliced_, camera, stamp_s, floor_.plane.height_m, floor_.free_from_m, floor_.free_to_m,
                      floor_.height_class, out);
 }

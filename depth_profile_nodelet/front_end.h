@@ -56,7 +56,9 @@ class FrontEnd {
 
   // The stages' results for the newest frame.
   const cv::Mat& rectified() const { return rectified_; }
-  const cv::Mat& unrolled() const { return unrolled_; }
+  const cv::Mat& unrolled() const {
+    return unrolled_how_ == RollingShutterCorrector::Outcome::kCorrected ? unrolled_ : rectified_;
+  }
   const cv::Mat& sliced() const { return sliced_; }
   const FloorResult& floor() const { return floor_; }
   bool uncalibrated() const { return corrector_.uncalibrated(); }

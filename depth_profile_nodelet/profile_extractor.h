@@ -22,6 +22,7 @@ struct DepthProfileConfig {
   double scan_fov_deg = 57.0;
   int scan_readings = 640;
   double scan_range_min_m = 0.45;
+  std::string scan_frame = "camera_link";
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -40,6 +41,7 @@ struct DepthProfileConfig {
     v.number("scan_fov_deg", scan_fov_deg, 10, 120, "deg", "Field of view of `scan`.");
     v.integer("scan_readings", scan_readings, 2, 4000, "", "Readings of `scan`.");
     v.number("scan_range_min_m", scan_range_min_m, 0, 2, "m", "range_min of `scan`.");
+    v.text("scan_frame", scan_frame, "Nodelet: frame of `scan`: at the camera, x forward, z up.");
   }
   std::vector<std::string> validate() const { return {}; }
 };

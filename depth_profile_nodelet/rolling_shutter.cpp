@@ -29,7 +29,6 @@ RollingShutterCorrector::Outcome RollingShutterCorrector::correct(const cv::Mat&
                                                                   const PinholeModel& camera, double stamp_s,
                                                                   const PoseBuffer& odometry,
                                                                   cv::Mat* unrolled) {
-  *unrolled = depth;
   if (config_.method == "off" || config_.readout_s <= 0.0) return Outcome::kStill;
   const double reference_s = stamp_s + config_.time_offset_s;
   Pose2 T_odom_reference;
@@ -50,11 +49,11 @@ RollingShutterCorrector::Outcome RollingShutterCorrector::correct(const cv::Mat&
   if (largest_rad * camera.fx_px * (1.0 + edge * edge) < 0.5) return Outcome::kStill;
   if (largest_rad * edge > 0.5) return Outcome::kNoOdometry;  // 30 rad/s: no robot turns so; odometry jumped
 
-  buffer_.create(depth.rows, depth.cols, CV_32FC1);
+  unrolled->create(depth.rows, depth.cols, CV_32FC1);
   for (int v = 0; v < depth.rows; ++v) {
     const double yaw_rad = row_yaw_rad_[static_cast<std::size_t>(v)];
     const float* from = depth.ptr<float>(v);
-    float* to = buffer_.ptr<float>(v);
+    float* to = unrolled->ptr<float>(v);
     if (config_.method == "paper") {
       shift_row(from, to, depth.cols, static_cast<int>(std::lround(-yaw_rad * camera.fx_px)));
       continue;
@@ -70,7 +69,6 @@ RollingShutterCorrector::Outcome RollingShutterCorrector::correct(const cv::Mat&
     turn_depth(to, depth.cols, static_cast<float>(c), static_cast<float>(s / camera.fx_px),
                static_cast<float>(camera.cx_px));
   }
-  *unrolled = buffer_;
   return Outcome::kCorrected;
 }
 

@@ -46,8 +46,7 @@ class RollingShutterCorrector {
   enum class Outcome { kCorrected, kStill, kNoOdometry };
   /// @param depth     32FC1 m, NaN invalid
   /// @param odometry  poses of the base; the camera turns with it
-  /// @param unrolled  same size; shares `depth`'s pixels when the robot did not turn or odometry does not
-  /// cover the frame
+  /// @param unrolled  same size, written only for kCorrected: otherwise `depth` itself is what to go on with
   Outcome correct(const cv::Mat& depth, const PinholeModel& camera, double stamp_s,
                   const PoseBuffer& odometry, cv::Mat* unrolled);
 
@@ -57,7 +56,6 @@ class RollingShutterCorrector {
   RollingShutterConfig config_;
   RowWarp warp_;
   std::vector<double> row_yaw_rad_;
-  cv::Mat buffer_;
 };
 
 }  // namespace knav
