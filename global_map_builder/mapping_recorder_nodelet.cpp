@@ -13,29 +13,11 @@
 #include <vector>
 
 #include "core/config.h"
+#include "global_map_builder/mapping_recorder_config.h"
 #include "ros_common/nodelet_base.h"
 #include "ros_common/parameters.h"
 
 namespace knav {
-namespace {
-
-struct MappingRecorderConfig {
-  std::string bag;
-  double depth_s = 20.0;
-
-  template <class Visitor>
-  void visit(Visitor& v) {
-    v.text("bag", bag, "The recording to write; it appears under this name when the node ends.");
-    v.number("depth_s", depth_s, 0, 1e6, "s", "Raw depth is recorded for the first seconds; 18 MB each.");
-  }
-  std::vector<std::string> validate() const {
-    if (bag.empty()) return {"'bag' must name the file to write."};
-    return {};
-  }
-};
-
-}  // namespace
-
 class MappingRecorderNodelet : public NodeletBase {
  public:
   ~MappingRecorderNodelet() override {

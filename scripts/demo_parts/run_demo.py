@@ -128,10 +128,9 @@ class Demo:
         self.line.done("calibrated: " + str(self.calibration.relative_to(self.out.parent)))
 
     def simulation(self, people):
-        arguments = [f"world:={self.world}", f"calibration:={self.calibration}", f"seed:={self.options.seed}"]
-        if people:
-            arguments.append(f"people:={self.worlds / 'demo_people.yaml'}")
-        return ["roslaunch", "kinect_nav", "simulation.launch", *arguments]
+        world = self.worlds / "demo_people.yaml" if people else self.world
+        return ["roslaunch", "kinect_nav", "simulation.launch", f"world:={world}", f"calibration:={self.calibration}",
+                f"seed:={self.options.seed}"]
 
     def map_building(self):
         import rospy
@@ -295,16 +294,16 @@ class Demo:
 
     def run(self):
         started = time.monotonic()
-        with open(self.worlds / "demo_goals.yaml", encoding="utf-8") as text:
-            goals_world = yaml.safe_load(text)["goals"]
+        with open(self.world, encoding="utf-8") as text:
+            places = yaml.safe_load(text)["places"]
         self.start_master()
         self.calibrate()
         mapping_measured = self.map_building()
         mapping, evaluation = self.build_map()
         # The map's origin is the robot's start; a user would click the goals in the map.
         map_world_start = recordings.inverse(mapping.truth.poses[0])
-        goals = {name: recordings.compose(map_world_start, (g["x_m"], g["y_m"], math.radians(g["yaw_deg"])))
-                 for name, g in goals_world.items()}
+        goals = {name: recordings.compose(map_world_start, (x, y, math.radians(yaw_deg)))
+                 for name, (x, y, yaw_deg) in places.items()}
         navigation_measured, results = self.drive_to_goals(goals)
         summary = self.summarize(mapping, evaluation, goals, mapping_measured, navigation_measured, results)
         summary["elapsed_s"] = round(time.monotonic() - started, 1)
