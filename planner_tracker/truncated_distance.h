@@ -29,14 +29,16 @@ class TruncatedDistance {
   int reach_cells() const { return reach_; }
   std::int16_t cut() const { return cut_; }
 
-  /// Recomputes `squared` in the window. What lies off the grid counts as blocked.
-  /// @param blocked [width x height], non-zero = blocked
-  void update(int width, int height, const std::uint8_t* blocked, const CellWindow& window, std::int16_t* squared);
+  /// Recomputes `squared` in the window, which is clipped to the grid. What lies off the grid counts as blocked.
+  /// @param cells [width x height], row-major; every value but `open` is blocked
+  void update(int width, int height, const std::uint8_t* cells, std::uint8_t open, const CellWindow& window,
+              std::int16_t* squared);
 
  private:
   int reach_;
   std::int16_t cut_;
   std::vector<std::int16_t> rows_;  ///< scratch: vertical distances, then their squares
+  std::vector<std::int16_t> run_;   ///< scratch: the sweep's current row
 };
 
 }  // namespace knav

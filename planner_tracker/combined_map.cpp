@@ -1,0 +1,175 @@
+#include "planner_tracker/combined_map.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+
+namespace knav {
+namespace {
+
+constexpr auto kOpen = static_cast<std::uint8_t>(CellState::kFree);
+
+const std::uint8_t* bytes(const std::vector<CellState>& state) {
+  return reinterpret_cast<const std::uint8_t*>(state.data());
+}
+
+bool same_grid(const GridGeometry& a, const GridGeometry& b) {
+  return a.width_cells == b.width_cells && a.height_cells == b.height_cells &&
+         std::abs(a.resolution_m - b.resolution_m) < 1e-6 && std::abs(a.origin_x_m - b.origin_x_m) < 1e-3 &&
+         std::abs(a.origin_y_m - b.origin_y_m) < 1e-3;
+}
+
+}  // namespace
+
+int MapLayer::squared_for(double clearance_m) const {
+  const double cells = clearance_m / geometry.resolution_m + 0.5;
+  return std::max(1, static_cast<int>(std::ceil(cells * cells - 1e-9)));
+}
+
+CombinedMap::CombinedMap(double reach_m, int occupied_threshold, int free_threshold)
+    : reach_m_(reach_m), occupied_threshold_(occupied_threshold), free_threshold_(free_threshold), distance_(1) {}
+
+CellState CombinedMap::local_state(std::int8_t value) const {
+  if (value < 0) return CellState::kUnknown;
+  if (value >= occupied_threshold_) return CellState::kOccupied;
+  return value <= free_threshold_ ? CellState::kFree : CellState::kUnknown;
+}
+
+void CombinedMap::set_global(const DistanceMap& distance, const OccupancyGrid& occupancy,
+                             const OccupancyGrid& keepout) {
+  const bool has_distance = !distance.empty(), has_occupancy = !occupancy.value.empty();
+  if (!has_distance && !has_occupancy) throw UserError("map: neither an occupancy grid nor a distance map is given.");
+  const GridGeometry geometry = has_occupancy ? occupancy.geometry : distance.geometry;
+  const std::size_t cells = geometry.cell_count();
+  if (!(geometry.resolution_m > 0.0) || cells == 0) throw UserError("map: it has no cells or no resolution.");
+  if (has_occupancy && occupancy.value.size() != cells) throw UserError("map: not one value per cell.");
+  if (has_distance && (!same_grid(distance.geometry, geometry) || distance.distance_m.size() != cells)) {
+    throw UserError("distance map: its grid is not that of the map; load both from the same directory.");
+  }
+  if (!keepout.value.empty() && (!same_grid(keepout.geometry, geometry) || keepout.value.size() != cells)) {
+    throw UserError("keepout map: its grid is not that of the map; give keepout.pgm the size of map.pgm.");
+  }
+  const int reach_cells = std::clamp(static_cast<int>(std::ceil(reach_m_ / geometry.resolution_m + 0.5)), 1, 126);
+  distance_ = TruncatedDistance(reach_cells);
+  global_.geometry = geometry;
+  global_.reach_cells = reach_cells;
+  global_.state.assign(cells, CellState::kUnknown);
+  for (std::size_t i = 0; i < cells; ++i) {
+    CellState state = CellState::kFree;
+    if (has_occupancy) state = local_state(occupancy.value[i]);
+    if (has_distance && state == CellState::kFree) {
+      // The contour may cut a cell that the occupancy grid calls free: within half a cell it is occupied.
+      const float d = distance.distance_m[i];
+      if (std::isnan(d)) state = CellState::kUnknown;
+      else if (has_occupancy ? d <= 0.0f : d < 0.5 * geometry.resolution_m) state = CellState::kOccupied;
+    }
+    if (!keepout.value.empty() && keepout.value[i] >= 50) state = CellState::kKeepout;
+    global_.state[i] = state;
+  }
+  global_.squared_cells.assign(cells, 0);
+  distance_.update(geometry.width_cells, geometry.height_cells, bytes(global_.state), kOpen,
+                   {0, 0, geometry.width_cells, geometry.height_cells}, global_.squared_cells.data());
+  combined_ = global_;
+  local_window_ = {};
+  local_cells_.clear();
+  changed_cells_ = cells;
+}
+
+void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local) {
+  if (empty() || local.value.size() != local.geometry.cell_count() || !is_finite(T_map_local)) return;
+  const GridGeometry& g = global_.geometry;
+  const GridGeometry& l = local.geometry;
+  // The known part of the local map only: often it is a small one.
+  CellWindow known;
+  for (int y = 0; y < l.height_cells; ++y) {
+    const std::int8_t* row = local.value.data() + l.index(0, y);
+    int first = 0, last = l.width_cells;
+    while (first < last && row[first] < 0) ++first;
+    while (last > first && row[last - 1] < 0) --last;
+    if (first < last) known = known.united({first, y, last, y + 1});
+  }
+  CellWindow window;
+  if (!known.empty()) {
+    for (const int ix : {known.x0, known.x1}) {
+      for (const int iy : {known.y0, known.y1}) {
+        const Point2 corner = T_map_local * Point2{l.origin_x_m + ix * l.resolution_m, l.origin_y_m + iy * l.resolution_m};
+        window.include(g.cell_x(corner.x_m), g.cell_y(corner.y_m));
+      }
+    }
+    window = window.clipped(g.width_cells, g.height_cells);
+  }
+  const CellWindow old_window = local_window_;
+  local_window_ = window.empty() ? CellWindow{} : window;
+  if (!window.empty()) sample_local(local, T_map_local, window);
+  apply(old_window.united(local_window_));
+}
+
+void CombinedMap::clear_local() {
+  const CellWindow old_window = local_window_;
+  local_window_ = {};
+  apply(old_window);
+}
+
+void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_local, const CellWindow& window) {
+  const GridGeometry& g = global_.geometry;
+  const GridGeometry& l = local.geometry;
+  local_cells_.resize(static_cast<std::size_t>(window.width()) * static_cast<std::size_t>(window.height()));
+  CellState by_value[256];
+  for (int v = -128; v < 128; ++v) by_value[v + 128] = local_state(static_cast<std::int8_t>(v));
+
+  // Each map cell asks the local cell its centre lies in; coordinates advance by constant steps along a row.
+  const Pose2 T_local_map = T_map_local.inverse();
+  const double step = g.resolution_m / l.resolution_m;
+  const double step_x = std::cos(T_local_map.yaw_rad) * step, step_y = std::sin(T_local_map.yaw_rad) * step;
+  for (int iy = window.y0; iy < window.y1; ++iy) {
+    const Point2 first = T_local_map * Point2{g.center_x_m(window.x0), g.center_y_m(iy)};
+    double x = (first.x_m - l.origin_x_m) / l.resolution_m, y = (first.y_m - l.origin_y_m) / l.resolution_m;
+    CellState* out = local_cells_.data() + static_cast<std::size_t>(iy - window.y0) * static_cast<std::size_t>(window.width());
+    for (int i = 0; i < window.width(); ++i, x += step_x, y += step_y) {
+      const bool inside = x >= 0.0 && y >= 0.0 && x < l.width_cells && y < l.height_cells;
+      out[i] = inside ? by_value[local.value[l.index(static_cast<int>(x), static_cast<int>(y))] + 128] : CellState::kUnknown;
+    }
+  }
+  // A turned wall one cell thick would get holes that way, so each occupied cell also marks the cell it lies in.
+  const double c = std::cos(T_map_local.yaw_rad), s = std::sin(T_map_local.yaw_rad);
+  for (int iy = 0; iy < l.height_cells; ++iy) {
+    for (int ix = 0; ix < l.width_cells; ++ix) {
+      if (by_value[local.value[l.index(ix, iy)] + 128] != CellState::kOccupied) continue;
+      const double lx = l.center_x_m(ix), ly = l.center_y_m(iy);
+      const int gx = g.cell_x(T_map_local.x_m + c * lx - s * ly), gy = g.cell_y(T_map_local.y_m + s * lx + c * ly);
+      if (gx < window.x0 || gy < window.y0 || gx >= window.x1 || gy >= window.y1) continue;
+      local_cells_[static_cast<std::size_t>(gy - window.y0) * static_cast<std::size_t>(window.width()) +
+                   static_cast<std::size_t>(gx - window.x0)] = CellState::kOccupied;
+    }
+  }
+}
+
+void CombinedMap::apply(const CellWindow& window) {
+  changed_cells_ = 0;
+  CellWindow dirty;
+  const CellWindow& lw = local_window_;
+  for (int iy = window.y0; iy < window.y1; ++iy) {
+    const bool local_row = !lw.empty() && iy >= lw.y0 && iy < lw.y1;
+    for (int ix = window.x0; ix < window.x1; ++ix) {
+      CellState local = CellState::kUnknown;
+      if (local_row && ix >= lw.x0 && ix < lw.x1) {
+        local = local_cells_[static_cast<std::size_t>(iy - lw.y0) * static_cast<std::size_t>(lw.width()) +
+                             static_cast<std::size_t>(ix - lw.x0)];
+      }
+      const std::size_t i = global_.geometry.index(ix, iy);
+      const CellState now = overlay(global_.state[i], local);
+      if (now == combined_.state[i]) continue;
+      // Only a change between open and not open moves clearances.
+      if ((now == CellState::kFree) != (combined_.state[i] == CellState::kFree)) dirty.include(ix, iy);
+      combined_.state[i] = now;
+      ++changed_cells_;
+    }
+  }
+  if (dirty.empty()) return;
+  const GridGeometry& g = global_.geometry;
+  distance_.update(g.width_cells, g.height_cells, bytes(combined_.state), kOpen, dirty.grown(distance_.reach_cells() + 1),
+                   combined_.squared_cells.data());
+}
+
+}  // namespace knav

@@ -1,0 +1,181 @@
+#include "planner_tracker/grid_planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+
+#include "planner_tracker/grid_search.h"
+#include "planner_tracker/path_shortener.h"
+
+namespace knav {
+namespace {
+
+constexpr int kStride = 2;
+
+}  // namespace
+
+struct GridPlanner::Search {
+  explicit Search(const PlannerTrackerConfig& c) : config(c) {}
+
+  PlannerTrackerConfig config;
+  ClearancePrice price;
+  LandmarkHeuristic landmarks;
+  GridSearch coarse, fine;
+  std::vector<Cell> cells, escape;
+  std::vector<Point2> points;
+  PathShortener shortener;
+
+  bool find_escape(const MapLayer& layer, const Cell& start, Cell* out);
+  bool find_way(const MapLayer& layer, const Cell& start, const Cell& goal, PlanResult* result);
+};
+
+GridPlanner::GridPlanner(const PlannerTrackerConfig& config) : search_(std::make_unique<Search>(config)) {}
+GridPlanner::~GridPlanner() = default;
+
+void GridPlanner::set_map(const MapLayer& layer) {
+  const PlannerTrackerConfig& c = search_->config;
+  search_->price = ClearancePrice(layer, c.hard_radius_m(), c.preferred_radius_m(), c.clearance.price);
+  search_->landmarks.build(SearchGraph(layer, search_->price, kStride));
+}
+
+/// Dijkstra from a closed cell through cells that never come nearer to something, to the first open one. Cells under
+/// the robot may be anything: it stands there.
+bool GridPlanner::Search::find_escape(const MapLayer& layer, const Cell& start, Cell* out) {
+  escape.clear();
+  const double resolution = layer.geometry.resolution_m;
+  const int r = std::max(1, static_cast<int>(config.clearance.escape_m / resolution));
+  const int under = static_cast<int>(config.robot_radius / resolution);
+  const int side = 2 * r + 1;
+  std::vector<float> cost(static_cast<std::size_t>(side * side), std::numeric_limits<float>::infinity());
+  std::vector<int> parent(cost.size(), -1);
+  const auto local = [&](int dx, int dy) { return static_cast<std::size_t>((dy + r) * side + dx + r); };
+  using Entry = std::pair<float, int>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open_list;
+  cost[local(0, 0)] = 0.0f;
+  open_list.push({0.0f, static_cast<int>(local(0, 0))});
+  while (!open_list.empty()) {
+    const auto [c, at] = open_list.top();
+    open_list.pop();
+    if (c > cost[static_cast<std::size_t>(at)]) continue;
+    const int dx = at % side - r, dy = at / side - r;
+    const std::int16_t here = layer.squared_at(start.ix + dx, start.iy + dy);
+    if (price.open(here)) {
+      *out = {start.ix + dx, start.iy + dy};
+      for (int n = at; n >= 0; n = parent[static_cast<std::size_t>(n)]) {
+        escape.push_back({start.ix + n % side - r, start.iy + n / side - r});
+      }
+      std::reverse(escape.begin(), escape.end());
+      return true;
+    }
+    for (int m = 0; m < 8; ++m) {
+      const int tx = dx + kSearchMove[m].dx, ty = dy + kSearchMove[m].dy;
+      if (tx * tx + ty * ty > r * r || !layer.geometry.contains(start.ix + tx, start.iy + ty)) continue;
+      const std::int16_t there = layer.squared_at(start.ix + tx, start.iy + ty);
+      if (there < here || (there == 0 && tx * tx + ty * ty > under * under)) continue;
+      const float next = c + static_cast<float>(kSearchMove[m].length);
+      if (next >= cost[local(tx, ty)]) continue;
+      cost[local(tx, ty)] = next;
+      parent[local(tx, ty)] = at;
+      open_list.push({next, static_cast<int>(local(tx, ty))});
+    }
+  }
+  return false;
+}
+
+bool GridPlanner::Search::find_way(const MapLayer& layer, const Cell& start, const Cell& goal, PlanResult* result) {
+  Cell nearest;
+  bool found = coarse.find(SearchGraph(layer, price, kStride), &landmarks, kStride, start, goal, &cells, &nearest);
+  result->expanded += coarse.expanded();
+  if (!found) {
+    // A gap that lies between the coarse nodes.
+    found = fine.find(SearchGraph(layer, price, 1), &landmarks, kStride, start, goal, &cells, &nearest);
+    result->expanded += fine.expanded();
+  }
+  if (!found) result->at = {layer.geometry.center_x_m(nearest.ix), layer.geometry.center_y_m(nearest.iy)};
+  return found;
+}
+
+void GridPlanner::plan(const MapLayer& layer, const Point2& start, const Point2& goal, PlanResult* result) {
+  Search& s = *search_;
+  result->path.clear();
+  result->expanded = 0;
+  result->length_m = result->cost_m = 0.0;
+  const GridGeometry& g = layer.geometry;
+  Cell from{g.cell_x(start.x_m), g.cell_y(start.y_m)};
+  const Cell to{g.cell_x(goal.x_m), g.cell_y(goal.y_m)};
+  if (!s.price.open(layer.squared_at(to.ix, to.iy))) {
+    result->at = goal;
+    result->code = PlanCode::kGoalUnknown;
+    if (layer.at(to.ix, to.iy) == CellState::kUnknown) return;
+    // Not unknown itself: what is too near, the nearest thing first?
+    const int r = static_cast<int>(std::ceil(s.config.hard_radius_m() / g.resolution_m)) + 1;
+    int best = std::numeric_limits<int>::max();
+    for (int dy = -r; dy <= r; ++dy) {
+      for (int dx = -r; dx <= r; ++dx) {
+        const CellState state = layer.at(to.ix + dx, to.iy + dy);
+        if (state == CellState::kFree || dx * dx + dy * dy >= best) continue;
+        best = dx * dx + dy * dy;
+        result->at = {g.center_x_m(to.ix + dx), g.center_y_m(to.iy + dy)};
+        result->code = state == CellState::kUnknown ? PlanCode::kGoalUnknown : PlanCode::kGoalOccupied;
+      }
+    }
+    return;
+  }
+  s.escape.clear();
+  if (!s.price.open(layer.squared_at(from.ix, from.iy)) && !s.find_escape(layer, from, &from)) {
+    result->code = PlanCode::kStartBlocked;
+    result->at = start;
+    return;
+  }
+  if (!s.find_way(layer, from, to, result)) {
+    result->code = PlanCode::kNoPath;
+    return;
+  }
+  result->code = PlanCode::kOk;
+  s.points.clear();
+  for (const Cell& cell : s.cells) s.points.push_back({g.center_x_m(cell.ix), g.center_y_m(cell.iy)});
+  if (s.escape.empty()) s.points.front() = start;
+  s.points.back() = goal;
+  s.shortener.shorten(layer, s.price, &s.points);
+  if (!s.escape.empty()) {
+    result->path.push_back(start);
+    for (std::size_t i = 1; i + 1 < s.escape.size(); ++i) {
+      result->path.push_back({g.center_x_m(s.escape[i].ix), g.center_y_m(s.escape[i].iy)});
+    }
+  }
+  result->path.insert(result->path.end(), s.points.begin(), s.points.end());
+  for (std::size_t i = 1; i < result->path.size(); ++i) {
+    const Point2 &a = result->path[i - 1], &b = result->path[i];
+    const double length = std::hypot(b.x_m - a.x_m, b.y_m - a.y_m);
+    const double cost = s.shortener.segment_cost_m(layer, s.price, a, b);
+    result->length_m += length;
+    // Parts of an escape are dear, not impossible.
+    result->cost_m += std::isfinite(cost) ? cost : length * (1.0 + 2.0 * s.config.clearance.price);
+  }
+}
+
+double GridPlanner::segment_cost_m(const MapLayer& layer, const Point2& from, const Point2& to) const {
+  return search_->shortener.segment_cost_m(layer, search_->price, from, to);
+}
+
+bool GridPlanner::open(const MapLayer& layer, const Point2& point) const {
+  return search_->price.open(layer.squared_at(layer.geometry.cell_x(point.x_m), layer.geometry.cell_y(point.y_m)));
+}
+
+bool GridPlanner::nearest_open(const MapLayer& layer, const Point2& point, double within_m, Point2* found) const {
+  const GridGeometry& g = layer.geometry;
+  const int cx = g.cell_x(point.x_m), cy = g.cell_y(point.y_m);
+  const int r = static_cast<int>(within_m / g.resolution_m);
+  int best = r * r + 1;
+  for (int dy = -r; dy <= r; ++dy) {
+    for (int dx = -r; dx <= r; ++dx) {
+      if (dx * dx + dy * dy >= best || !search_->price.open(layer.squared_at(cx + dx, cy + dy))) continue;
+      best = dx * dx + dy * dy;
+      *found = {g.center_x_m(cx + dx), g.center_y_m(cy + dy)};
+    }
+  }
+  return best <= r * r;
+}
+
+}  // namespace knav
