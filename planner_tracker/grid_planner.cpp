@@ -25,7 +25,11 @@ struct GridPlanner::Search {
   std::vector<Cell> cells, escape;
   std::vector<Point2> points;
   PathShortener shortener;
+  const MapLayer* labelled = nullptr;  ///< the layer given to set_map
+  std::vector<std::uint16_t> part;     ///< per cell: its connected part; 0 = closed, or one part too many
 
+  void label_parts(const MapLayer& layer);
+  bool apart(const MapLayer& layer, const Cell& a, const Cell& b) const;
   bool find_escape(const MapLayer& layer, const Cell& start, Cell* out);
   bool find_way(const MapLayer& layer, const Cell& start, const Cell& goal, PlanResult* result);
 };
@@ -33,10 +37,43 @@ struct GridPlanner::Search {
 GridPlanner::GridPlanner(const PlannerTrackerConfig& config) : search_(std::make_unique<Search>(config)) {}
 GridPlanner::~GridPlanner() = default;
 
+/// Which open cells hang together: tells at once that no way leads to a goal.
+void GridPlanner::Search::label_parts(const MapLayer& layer) {
+  labelled = &layer;
+  part.assign(layer.state.size(), 0);
+  const SearchGraph graph(layer, price, 1);
+  std::vector<std::uint32_t> stack;
+  std::uint16_t label = 0;
+  for (std::size_t first = 0; first < part.size() && label < 65535; ++first) {
+    if (part[first] != 0 || !price.open(layer.squared_cells[first])) continue;
+    part[first] = ++label;
+    stack.push_back(static_cast<std::uint32_t>(first));
+    while (!stack.empty()) {
+      const std::size_t cell = stack.back();
+      stack.pop_back();
+      const int ix = graph.jx(cell), iy = graph.jy(cell);
+      for (int m = 0; m < kSearchMoves; ++m) {
+        if (graph.move_cost_mm(ix, iy, 256, m) == 0) continue;
+        const std::size_t to = graph.node(ix + kSearchMove[m].dx, iy + kSearchMove[m].dy);
+        if (part[to] != 0) continue;
+        part[to] = label;
+        stack.push_back(static_cast<std::uint32_t>(to));
+      }
+    }
+  }
+}
+
+bool GridPlanner::Search::apart(const MapLayer& layer, const Cell& a, const Cell& b) const {
+  if (&layer != labelled) return false;
+  const std::uint16_t pa = part[layer.geometry.index(a.ix, a.iy)], pb = part[layer.geometry.index(b.ix, b.iy)];
+  return pa != 0 && pb != 0 && pa != pb;
+}
+
 void GridPlanner::set_map(const MapLayer& layer) {
   const PlannerTrackerConfig& c = search_->config;
   search_->price = ClearancePrice(layer, c.hard_radius_m(), c.preferred_radius_m(), c.clearance.price);
   search_->landmarks.build(SearchGraph(layer, search_->price, kStride));
+  search_->label_parts(layer);
 }
 
 /// Dijkstra from a closed cell through cells that never come nearer to something, to the first open one. Cells under
@@ -84,6 +121,10 @@ bool GridPlanner::Search::find_escape(const MapLayer& layer, const Cell& start, 
 }
 
 bool GridPlanner::Search::find_way(const MapLayer& layer, const Cell& start, const Cell& goal, PlanResult* result) {
+  if (apart(layer, start, goal)) {
+    result->at = {layer.geometry.center_x_m(goal.ix), layer.geometry.center_y_m(goal.iy)};
+    return false;
+  }
   Cell nearest;
   bool found = coarse.find(SearchGraph(layer, price, kStride), &landmarks, kStride, start, goal, &cells, &nearest);
   result->expanded += coarse.expanded();

@@ -103,7 +103,7 @@ void run(Options options) {
   start = now_ms();
   planner.set_map(map.global());
   const double landmarks_ms = now_ms() - start;
-  const MapLayer& layer = map.combined();
+  const MapLayer& layer = map.global();
 
   RandomStream random(1, random_stream::kTest, 0, 0);
   const auto random_point = [&] {
