@@ -202,7 +202,7 @@ void KinectModel::sense_row(int row, const TrueRow& in, std::uint16_t* depth_mm)
     const float z = in.z_m[u];
     const float fall = 1.0f + z * z * 0.01f;
     const float grain =
-        1.0f + 0.35f * unit * static_cast<float>(texture[texture_start + static_cast<std::uint32_t>(u)]);
+        1.0f + 0.2f * unit * static_cast<float>(texture[texture_start + static_cast<std::uint32_t>(u)]);
     const bool seen = !any_dropout || in.signal[u] * grain > threshold * fall;
     const bool valid = z >= min_range && z < 40.0f && seen;
     depth_mm[u] = valid ? static_cast<std::uint16_t>(static_cast<int>(mm + 0.5f)) : std::uint16_t{0};

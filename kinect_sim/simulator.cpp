@@ -40,13 +40,15 @@ Pose2 FrameRequest::pose_at(double stamp) const {
 struct Simulator::Rendering {
   Rendering(const WorldConfig& world, const SimulatorConfig& config)
       : camera(kinect_camera()),
-        scene(world),
-        renderer(camera),
+        meshes(world),
+        scene(meshes),
+        renderer(meshes, camera),
         kinect(KinectConfig::preset(config.sensor), camera, static_cast<std::uint64_t>(config.seed),
                static_cast<std::uint64_t>(config.device_seed)),
         z_m(static_cast<std::size_t>(camera.width_px)),
         signal(z_m.size()) {}
   PinholeModel camera;
+  WorldMeshes meshes;
   Scene scene;
   DepthRenderer renderer;
   KinectModel kinect;
@@ -206,13 +208,15 @@ void Simulator::request_now(FrameRequest* request) const {
 template <class Row>
 void Simulator::for_each_row(const FrameRequest& request, const Row& row) {
   Rendering& r = *rendering_;
-  r.scene.update(request.dynamic);
   const Eigen::Isometry3d mount = T_base_optical();
-  const double row_s = config_.readout_s / 479.0;
-  for (int v = 0; v < r.camera.height_px; ++v) {
+  const double row_s = config_.readout_s / (r.camera.height_px - 1);
+  const auto optical = [&](int v) {
     const Pose2 base = request.pose_at(request.stamp_s + (v - config_.stamp_row_px) * row_s);
-    row(v, (isometry(base) * mount).cast<float>());
-  }
+    return Eigen::Isometry3f((isometry(base) * mount).cast<float>());
+  };
+  const int last = r.camera.height_px - 1;
+  r.renderer.start_frame(request.dynamic, optical(0), optical(last));
+  for (int v = 0; v <= last; ++v) row(v, optical(v));
 }
 
 void Simulator::render(const FrameRequest& request, cv::Mat* depth_mm) {
@@ -220,7 +224,7 @@ void Simulator::render(const FrameRequest& request, cv::Mat* depth_mm) {
   depth_mm->create(r.camera.height_px, r.camera.width_px, CV_16UC1);
   r.kinect.start_frame(request.index, request.stamp_s);
   for_each_row(request, [&](int v, const Eigen::Isometry3f& T_world_optical) {
-    r.renderer.cast_row(r.scene, T_world_optical, v, r.z_m.data(), r.signal.data());
+    r.renderer.render_row(T_world_optical, v, r.z_m.data(), r.signal.data());
     r.kinect.sense_row(v, {r.z_m.data(), r.signal.data()}, depth_mm->ptr<std::uint16_t>(v));
   });
 }
@@ -230,7 +234,7 @@ void Simulator::render_true_depth(const FrameRequest& request, cv::Mat* depth_m)
   depth_m->create(r.camera.height_px, r.camera.width_px, CV_32FC1);
   for_each_row(request, [&](int v, const Eigen::Isometry3f& T_world_optical) {
     float* out = depth_m->ptr<float>(v);
-    r.renderer.cast_row(r.scene, T_world_optical, v, out, nullptr);
+    r.renderer.render_row(T_world_optical, v, out, nullptr);
     for (int u = 0; u < r.camera.width_px; ++u) {
       if (!std::isfinite(out[u])) out[u] = std::numeric_limits<float>::quiet_NaN();
     }
