@@ -80,7 +80,7 @@ bool OpenNIDevice::open() {
     if (!runtime_) runtime_ = OpenNIRuntime::acquire();
     const ResolvedDevice device = resolve_device(*runtime_, config_.device_id);
     if (device.uri.empty()) {
-      report_problem(device.problem + " Waiting for it.");
+      if (!lost_) report_problem(device.problem + " Waiting for it.");
       return false;
     }
     session_ = std::make_unique<OpenNISession>(runtime_, device, config_, [this] {
@@ -97,22 +97,23 @@ bool OpenNIDevice::open() {
   last_index_[0] = last_index_[1] = -1;
   last_frame_s_ = steady_s();
   next_start_s_ = 0.0;
-  bool was_lost = false;
+  lost_ = false;
+  bool was_stalled = false;
   {
     std::lock_guard<std::mutex> lock(mutex_);
-    was_lost = status_.state == DeviceState::kStalled;
+    was_stalled = status_.state == DeviceState::kStalled;
     ++status_.openings;
     status_.uri = session_->uri();
     status_.vendor = session_->vendor();
     status_.name = session_->name();
     status_.serial = session_->serial();
     // A stalled device counts as stalled until a frame comes.
-    if (!was_lost) {
+    if (!was_stalled) {
       status_.state = DeviceState::kIdle;
       status_.problem.clear();
     }
   }
-  if (!was_lost) {
+  if (!was_stalled) {
     reported_.clear();
     on_event_(false, fmt::format("Opened {} {}, serial number {} ({}).", session_->vendor(), session_->name(),
                                  session_->serial().empty() ? "unknown" : session_->serial(), session_->uri()));
@@ -221,6 +222,7 @@ void OpenNIDevice::run() {
         ++status_.disconnections;
       }
       ended = !config_.enable_reconnect;
+      lost_ = true;
       close(ended ? DeviceState::kEnded : DeviceState::kSearching,
             uri + (ended ? ": was unplugged, and enable_reconnect is false." : ": was unplugged. Waiting for it."));
     } else if (session_->at_end_of_file() && !config_.playback_repeat) {

@@ -81,6 +81,7 @@ class OpenNIDevice {
   double next_start_s_ = 0.0;  // a stream that did not start is not tried again before
   int last_index_[kSensorStreamCount] = {-1, -1};
   std::string reported_;
+  bool lost_ = false;  // was unplugged: that it is not there has been said
 
   std::thread thread_;
 };

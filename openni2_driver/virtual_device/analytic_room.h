@@ -10,13 +10,21 @@
 namespace knav {
 
 /// A room with a closed formula, so that tests know every pixel: floor 0.5 m below the camera, ceiling 2.0 m above,
-/// side walls 3.0 m to the left and right, and a wall ahead that starts at 1 m, recedes 50 mm a frame and is back at
-/// 1 m after 381 frames (20 m).
+/// side walls 3.0 m to the left and right, and a wall ahead at one of 381 distances, 1 to 20 m by 50 mm. It leaps
+/// through them in an order that covers the range within a second and tells the frame's number modulo 381.
 constexpr double kRoomFloorM = 0.5, kRoomCeilingM = 2.0, kRoomSideM = 3.0;
-constexpr int kRoomNearestMm = 1000, kRoomStepMm = 50, kRoomSteps = 381;
+constexpr int kRoomNearestMm = 1000, kRoomStepMm = 50, kRoomSteps = 381, kRoomLeap = 97;
 
 inline int room_wall_mm(uint64_t frame) {
-  return kRoomNearestMm + kRoomStepMm * static_cast<int>(frame % static_cast<uint64_t>(kRoomSteps));
+  return kRoomNearestMm + kRoomStepMm * (static_cast<int>(frame % static_cast<uint64_t>(kRoomSteps)) * kRoomLeap % kRoomSteps);
+}
+
+/// The frame, modulo 381, that shows the wall at this distance; -1 if none does.
+inline int room_frame_of_wall(int wall_mm) {
+  for (int frame = 0; frame < kRoomSteps; ++frame) {
+    if (room_wall_mm(static_cast<uint64_t>(frame)) == wall_mm) return frame;
+  }
+  return -1;
 }
 
 /// Depth [mm] along the optical axis of the nearest of floor, ceiling and side walls; without the wall ahead.

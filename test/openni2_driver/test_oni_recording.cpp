@@ -1,0 +1,109 @@
+// OpenNI2's recorder and its stock file driver, with depth to 20 m.
+
+#include <OpenNI.h>
+#include <gmock/gmock.h>
+
+#include "virtual_device_fixture.h"
+
+using knav::DeviceState;
+using knav::OpenNIDeviceConfig;
+using knav::SensorStream;
+using knav::VirtualDeviceTest;
+using knav::WatchedDevice;
+using testing::HasSubstr;
+
+namespace {
+
+/// Records for a while; returns the indices of the depth frames that came in the meantime.
+std::vector<int> record(const std::string& path, double seconds) {
+  std::vector<int> indices;
+  auto runtime = knav::OpenNIRuntime::acquire();
+  openni::Device device;
+  EXPECT_EQ(device.open(openni::ANY_DEVICE), openni::STATUS_OK) << openni::OpenNI::getExtendedError();
+  openni::VideoStream depth;
+  EXPECT_EQ(depth.create(device, openni::SENSOR_DEPTH), openni::STATUS_OK);
+  openni::Recorder recorder;
+  EXPECT_EQ(recorder.create(path.c_str()), openni::STATUS_OK);
+  EXPECT_EQ(recorder.attach(depth), openni::STATUS_OK);
+  EXPECT_EQ(recorder.start(), openni::STATUS_OK);
+  EXPECT_EQ(depth.start(), openni::STATUS_OK);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  while (std::chrono::steady_clock::now() < end) {
+    openni::VideoStream* streams[] = {&depth};
+    int ready = 0;
+    if (openni::OpenNI::waitForAnyStream(streams, 1, &ready, 500) != openni::STATUS_OK) break;
+    openni::VideoFrameRef frame;
+    depth.readFrame(&frame);
+    indices.push_back(frame.getFrameIndex());
+  }
+  depth.stop();
+  recorder.stop();
+  recorder.destroy();
+  depth.destroy();
+  device.close();
+  return indices;
+}
+
+int frame_shown(const WatchedDevice::Image& image) { return knav::room_frame_of_wall(image.pixels[240 * 640 + 320]); }
+
+class OniRecordingTest : public VirtualDeviceTest {
+ protected:
+  void SetUp() override {
+    VirtualDeviceTest::SetUp();
+    path_ = control_path_ + ".oni";
+  }
+  void TearDown() override {
+    std::remove(path_.c_str());
+    VirtualDeviceTest::TearDown();
+  }
+  std::string path_;
+};
+
+}  // namespace
+
+TEST_F(OniRecordingTest, EveryFrameComesBackExactly) {
+  const std::vector<int> recorded = record(path_, 1.5);
+  ASSERT_GE(recorded.size(), 30U);
+  OpenNIDeviceConfig config;
+  config.device_id = path_;
+  config.playback_repeat = false;
+  WatchedDevice watched(config, true);
+  watched.device.request(SensorStream::kDepth, true);
+  ASSERT_TRUE(watched.reaches(DeviceState::kEnded, 8.0)) << watched.device.status().problem;
+  EXPECT_THAT(watched.device.status().problem, HasSubstr("at its end"));
+
+  const auto images = watched.images();
+  // The recorder may hold a frame more than was read, at either end.
+  EXPECT_GE(images.size() + 1, recorded.size());
+  int farthest_mm = 0;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const int frame = frame_shown(images[i]);
+    ASSERT_GE(frame, 0);
+    EXPECT_EQ(knav::wrong_pixels(images[i].pixels, static_cast<uint64_t>(frame), {640, 480}), 0) << "frame " << frame;
+    if (i > 0) {
+      EXPECT_EQ(frame, frame_shown(images[i - 1]) + 1) << "a frame is missing or out of order";
+    }
+    farthest_mm = std::max<int>(farthest_mm, knav::room_wall_mm(static_cast<uint64_t>(frame)));
+  }
+  EXPECT_GE(farthest_mm, 19000) << "the test should have seen all distances";
+}
+
+TEST_F(OniRecordingTest, RepeatsUntilNobodyWantsIt) {
+  record(path_, 0.5);
+  OpenNIDeviceConfig config;
+  config.device_id = path_;
+  WatchedDevice watched(config, true);
+  watched.device.request(SensorStream::kDepth, true);
+  ASSERT_TRUE(watched.sends(40, SensorStream::kDepth, 6.0)) << "a second has 30 frames, the recording fewer";
+  EXPECT_EQ(watched.device.status().state, DeviceState::kStreaming);
+  EXPECT_TRUE(watched.faults().empty());
+}
+
+TEST_F(OniRecordingTest, AFileThatIsNoRecordingIsRefusedByName) {
+  std::ofstream(path_) << "this is not a recording\n";
+  OpenNIDeviceConfig config;
+  config.device_id = path_;
+  WatchedDevice watched(config);
+  ASSERT_TRUE(knav::wait_until([&] { return !watched.faults().empty(); }));
+  EXPECT_THAT(watched.faults().front(), HasSubstr(path_));
+}
