@@ -78,6 +78,7 @@ bool Localizer::has_map() const { return !state_->fields.map.empty(); }
 const DistanceMap& Localizer::map() const { return state_->fields.map; }
 const LocalizerResult& Localizer::result() const { return state_->result; }
 const ParticleSet& Localizer::particles() const { return state_->belief.particles(); }
+bool Localizer::initialized() const { return !state_->belief.empty(); }
 void Localizer::force_update() { state_->forced = true; }
 
 void Localizer::initialize(const Pose2& T_map_base, const Eigen::Matrix3d& covariance, Trust trust) {

@@ -37,6 +37,8 @@ class Localizer {
   /// Spreads the particles around a pose. UserError on a pose or covariance that is not finite.
   /// @param covariance (x [m], y [m], yaw [rad]) in the map frame
   void initialize(const Pose2& T_map_base, const Eigen::Matrix3d& covariance, Trust trust = Trust::kGiven);
+  /// A pose was given, or found: there are particles.
+  bool initialized() const;
   /// Forgets the pose and searches the whole map.
   void initialize_globally();
   /// Forgets pose and motion (a clock that jumped back); the map stays.

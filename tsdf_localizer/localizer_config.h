@@ -11,7 +11,7 @@ namespace knav {
 struct MeasurementConfig {
   double truncation_m = 0.5;
   double unknown_cost = 0.5;
-  double temperature = 0.012;
+  double temperature = 0.006;
   double evidence_min = 0.02;
   double noise_m = 0.05;
   double noise_per_range_squared = 0.002;
