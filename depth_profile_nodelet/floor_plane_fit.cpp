@@ -11,6 +11,8 @@
 namespace knav {
 namespace {
 
+constexpr int kBlockRows = 16;
+
 struct RowTerms {
   float row_up, per_fx, cx, up_x, height, inverse_height, y;
   float gate_m, gate_per_m, range_max_m;
@@ -115,6 +117,8 @@ bool FloorPlaneFit::fit_frame(const cv::Mat& depth, const PinholeModel& camera, 
 void FloorPlaneFit::accumulate(const cv::Mat& depth, const PinholeModel& camera, const FloorPlane& reference,
                                double gate_m, double gate_per_m) {
   sums_.reset(depth.cols);
+  block_.reset(depth.cols);
+  candidates_.assign(static_cast<std::size_t>(depth.cols), 0.0f);
   const bool paper = config_.method == "paper";
   const double far_m = paper ? 20.0 : config_.range_max_m;
   const double edge = std::max(camera.cx_px, camera.width_px - camera.cx_px) / camera.fx_px;
@@ -127,48 +131,78 @@ void FloorPlaneFit::accumulate(const cv::Mat& depth, const PinholeModel& camera,
   terms.gate_m = static_cast<float>(paper ? 1e9 : gate_m);
   terms.gate_per_m = static_cast<float>(gate_per_m);
   terms.range_max_m = static_cast<float>(far_m);
-  for (int v = 0; v < depth.rows; ++v) {
+  int rows_in_block = 0;
+  for (int v = depth.rows - 1; v >= 0; --v) {
     const double y = (v - camera.cy_px) / camera.fy_px;
     const double up = reference.up.y() * y + reference.up.z();
-    if (paper) {
-      if (v < depth.rows - config_.paper_rows) continue;
-    } else if (up - std::abs(reference.up.x()) * edge > (gate_m - reference.height_m) / far_m + gate_per_m) {
-      continue;  // no candidate can lie in this row
-    }
+    const bool outside =
+        paper ? v < depth.rows - config_.paper_rows
+              // No candidate can lie in this row.
+              : up - std::abs(reference.up.x()) * edge > (gate_m - reference.height_m) / far_m + gate_per_m;
+    if (outside) continue;
     terms.row_up = static_cast<float>(up);
     terms.y = static_cast<float>(y);
-    add_row(depth.ptr<float>(v), depth.cols, terms, sums_.n.data(), sums_.y.data(), sums_.yy.data(),
-            sums_.r.data(), sums_.yr.data(), sums_.rr.data());
+    add_row(depth.ptr<float>(v), depth.cols, terms, block_.n.data(), block_.y.data(), block_.yy.data(),
+            block_.r.data(), block_.yr.data(), block_.rr.data());
+    if (!paper && ++rows_in_block == kBlockRows) {
+      add_block(reference);
+      rows_in_block = 0;
+    }
   }
+  add_block(reference);
+}
+
+/// The rows up to where a wall stands are floor, the wall's foot is within the gate too: so readings are
+/// judged by blocks of rows, and only blocks that rise like a floor join their column's sums.
+void FloorPlaneFit::add_block(const FloorPlane& reference) {
+  const bool paper = config_.method == "paper";
+  for (std::size_t u = 0; u < sums_.n.size(); ++u) {
+    candidates_[u] += block_.n[u];
+    if (block_.n[u] < 4.0f || !(paper || like_floor(block_, u, reference))) continue;
+    sums_.n[u] += block_.n[u];
+    sums_.y[u] += block_.y[u];
+    sums_.yy[u] += block_.yy[u];
+    sums_.r[u] += block_.r[u];
+    sums_.yr[u] += block_.yr[u];
+    sums_.rr[u] += block_.rr[u];
+  }
+  block_.reset(static_cast<int>(sums_.n.size()));
+}
+
+/// Do the readings lie on a line, and (but for the paper) does it rise as the floor's?
+bool FloorPlaneFit::like_floor(const Sums& sums, std::size_t u, const FloorPlane& reference) const {
+  const double n = sums.n[u], mean_y = sums.y[u] / n, mean_r = sums.r[u] / n;
+  const double var_y = sums.yy[u] / n - mean_y * mean_y;
+  const double cov = sums.yr[u] / n - mean_y * mean_r;
+  if (var_y < 1e-9) return false;
+  const double slope = cov / var_y;
+  const double var_r = std::max(0.0, sums.rr[u] / n - mean_r * mean_r - slope * cov);
+  if (std::sqrt(var_r) > config_.noise_codes * kInverseDepthPerCode) return false;
+  if (config_.method == "paper") return true;
+  // The inverse depth of a floor rises by 1 / height per unit of y; a wall's does not rise at all. A slope
+  // from few rows is itself uncertain.
+  const double steepness = std::abs(gradient_of(reference).y());
+  const double uncertainty = 2.0 * kInverseDepthPerCode / std::sqrt(n * var_y);
+  return std::abs(slope) <=
+         steepness * (config_.height_tolerance_m / reference.height_m + 0.15) + uncertainty;
 }
 
 int FloorPlaneFit::vote(const PinholeModel& camera, const FloorPlane& reference, int* heard) {
   const std::size_t width = sums_.n.size();
   votes_.assign(width, 0);
   const bool paper = config_.method == "paper";
-  const double noise_per_m = config_.noise_codes * kInverseDepthPerCode;
   const int rows = paper ? std::max(config_.min_rows, config_.paper_rows / 2) : config_.min_rows;
-  // The inverse depth of a floor rises by 1 / height per unit of y; a wall's does not rise at all.
-  const double steepness = std::abs(gradient_of(reference).y());
-  const double slope_tolerance = steepness * (config_.height_tolerance_m / reference.height_m + 0.15);
   int agreed = 0;
   *heard = 0;
   for (std::size_t u = 0; u < width; ++u) {
-    const double n = sums_.n[u];
-    if (n < rows) continue;
+    if (candidates_[u] < static_cast<float>(rows)) continue;
     ++*heard;
-    const double mean_y = sums_.y[u] / n, mean_r = sums_.r[u] / n;
-    const double var_y = sums_.yy[u] / n - mean_y * mean_y;
-    const double cov = sums_.yr[u] / n - mean_y * mean_r;
-    if (var_y < 1e-9) continue;
-    const double slope = cov / var_y;
-    const double var_r = std::max(0.0, sums_.rr[u] / n - mean_r * mean_r - slope * cov);
-    if (std::sqrt(var_r) > noise_per_m) continue;
-    if (!paper && std::abs(slope) > slope_tolerance) continue;
+    if (sums_.n[u] < static_cast<float>(rows) || !like_floor(sums_, u, reference)) continue;
     votes_[u] = 1;
     ++agreed;
   }
   if (paper) return agreed;
+  const double noise_per_m = config_.noise_codes * kInverseDepthPerCode;
   // The columns must agree with each other: those off the joint plane (a low platform's) are put out twice
   // over.
   for (int round = 0; round < 2 && agreed >= config_.min_columns; ++round) {

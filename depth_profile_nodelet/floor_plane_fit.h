@@ -83,11 +83,14 @@ class FloorPlaneFit {
   bool fit_frame(const cv::Mat& depth, const PinholeModel& camera, const FloorPlane& mount, Result* result);
   void accumulate(const cv::Mat& depth, const PinholeModel& camera, const FloorPlane& reference,
                   double gate_m, double gate_per_m);
+  void add_block(const FloorPlane& reference);
+  bool like_floor(const Sums& sums, std::size_t u, const FloorPlane& reference) const;
   int vote(const PinholeModel& camera, const FloorPlane& reference, int* heard);
   bool solve(const PinholeModel& camera, const FloorPlane& reference, FloorPlane* plane) const;
 
   FloorFitConfig config_;
-  Sums sums_;
+  Sums sums_, block_;  // block_: of the rows since the last add_block()
+  std::vector<float> candidates_;
   std::vector<std::uint8_t> votes_;
   bool has_previous_ = false;
   double previous_stamp_s_ = 0.0;

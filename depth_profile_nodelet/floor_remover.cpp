@@ -35,6 +35,7 @@ void slice_row(const float* z_m, const float* x, int width, const RowTerms& term
 
 struct FollowTerms {
   float gap_m, gap_per_m;      ///< the floor may be interrupted this far, more with distance
+  float follow_to_m;           ///< farther off the floor's readings are noise
   float floor_range_m;         ///< rows that meet the floor farther off belong to the sweep
   float below_m, below_per_m;  ///< readings this far under the floor are a drop
 };
@@ -56,7 +57,8 @@ void follow_row(const float* z_m, const float* x, int width, const RowTerms& ter
     const float expected =
         t.height_m * forward_ray / (down ? -up_ray : 1e-4f);  // where this row meets the floor
     const float low = t.bottom_m + t.bottom_per_m * forward;
-    const bool on_floor = down & (height <= low) & (height >= -low);
+    const bool on_floor = down & (expected < f.follow_to_m) & (forward < 2.0f * f.follow_to_m) &
+                          (height <= low) & (height >= -low);
     const bool started = free_to[u] > 0.0f;
     const bool gap = started & !on_floor & (expected > free_to[u] * (1.0f + f.gap_per_m) + f.gap_m);
     const float living = gap ? 0.0f : alive[u];
@@ -148,6 +150,7 @@ void FloorRemover::slice_rows(const cv::Mat& depth, const PinholeModel& camera, 
   follow.gap_m = 0.15f;
   follow.gap_per_m = 0.15f;
   follow.floor_range_m = static_cast<float>(config_.floor_range_m);
+  follow.follow_to_m = static_cast<float>(1.5 * config_.floor_range_m);
   follow.below_m = static_cast<float>(0.05 + 2.0 * config_.slice_bottom_m);
   follow.below_per_m = static_cast<float>(3.0 * config_.slice_bottom_per_m);
   for (int v = depth.rows - 1; v >= 0; --v) {
@@ -208,11 +211,13 @@ void FloorRemover::conclude(const PinholeModel& camera, const FloorPlane& plane,
     if (columns_.floor_rows[u] >= 3.0f) {
       if (surface) {
         const bool reached = to >= std::min(0.95f * floor_range_m, 0.9f * z - 0.2f);
-        to = reached && (z <= floor_range_m || swept) && !drop ? z : std::min(to, z);
+        // The surface lies somewhere in its window: the profile, which knows where, ends the interval there.
+        const float far_side = surface_.window_end_m()[u];
+        to = reached && (z <= floor_range_m || swept) && !drop ? far_side : std::min(to, far_side);
       }
     } else if (config_.free_without_floor && surface && !drop) {
       from = static_cast<float>(config_.view_near_m);
-      to = z;
+      to = surface_.window_end_m()[u];
     } else {
       continue;
     }

@@ -56,7 +56,9 @@ struct FloorResult {
   FloorPlane plane;  ///< in the camera's optical frame
   FloorSource source = FloorSource::kMount;
   double vote_fraction = 0.0;
-  std::vector<float> free_from_m, free_to_m;  ///< levelled forward distance, NaN = nothing seen free
+  /// Levelled forward distance, NaN = nothing seen free. Where free_to reaches the nearest surface it ends at the far
+  /// side of that surface's noise; ProfileExtractor ends it at the surface.
+  std::vector<float> free_from_m, free_to_m;
   std::vector<HeightClass> height_class;      ///< of the nearest supported obstacle
 };
 

@@ -56,8 +56,7 @@ class DepthCorrectionNodelet : public NodeletBase {
       return;
     }
     const auto rectified = images_.take();
-    cv::Mat corrected = make_depth_message(image->header, camera_.rectified.width_px,
-                                           camera_.rectified.height_px, rectified.get());
+    cv::Mat corrected = make_depth_message(image->header, raw.cols, raw.rows, rectified.get());
     if (!corrector_->correct(raw, camera_, &corrected)) {
       NODELET_WARN_THROTTLE(5.0, "%s: %s", getName().c_str(), corrector_->fault().c_str());
       return;

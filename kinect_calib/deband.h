@@ -1,0 +1,25 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace knav {
+
+/// Paper section III.B: the sensor's vertical bands (constant offsets of whole groups of columns, which move
+/// with scene and distance) must not be learned. Finds the steps between bands along the horizontal and takes
+/// them out, keeping the frame-wide mean; what changes smoothly across the image, the error to be learned,
+/// stays.
+class Debander {
+ public:
+  /// @param depth_m 32FC1 m of a flat wall, NaN invalid; corrected in place
+  /// @return number of steps found
+  int remove_bands(cv::Mat* depth_m);
+  /// What was taken off each column [1/m].
+  const std::vector<double>& band_per_m() const { return band_per_m_; }
+
+ private:
+  std::vector<double> column_per_m_, step_per_m_, band_per_m_;
+  std::vector<float> values_;
+};
+
+}  // namespace knav
