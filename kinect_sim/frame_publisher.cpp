@@ -14,11 +14,13 @@ FramePublisher::FramePublisher(ros::NodeHandle& handle, Simulator& simulator,
   image_ = handle.advertise<sensor_msgs::Image>("camera/depth/image_raw", 4);
   info_ = handle.advertise<sensor_msgs::CameraInfo>("camera/depth/camera_info", 4);
   lidar_ = handle.advertise<sensor_msgs::LaserScan>("lidar_scan", 4);
+  range_ = handle.advertise<sensor_msgs::Range>("range", 4);
   perfect_ = handle.advertise<sensor_msgs::LaserScan>("perfect_scan_360", 4);
 }
 
 bool FramePublisher::anybody_listens() const {
-  return depth_is_wanted() || lidar_.getNumSubscribers() > 0 || perfect_.getNumSubscribers() > 0;
+  return depth_is_wanted() || lidar_.getNumSubscribers() > 0 || perfect_.getNumSubscribers() > 0 ||
+         range_.getNumSubscribers() > 0;
 }
 
 sensor_msgs::ImagePtr FramePublisher::free_image() {
@@ -47,6 +49,7 @@ void FramePublisher::publish(const FrameRequest& request) {
     simulator_.scan_lidar(request, &scan_);
     publish_scan(lidar_, "laser");
   }
+  if (range_.getNumSubscribers() > 0) range_.publish(range_message(simulator_, request));
   if (perfect_.getNumSubscribers() > 0) {
     simulator_.scan_perfect(request, config_.perfect_scan_height_m, &scan_);
     publish_scan(perfect_, "base_link");

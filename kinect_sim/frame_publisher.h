@@ -27,7 +27,7 @@ class FramePublisher {
 
   Simulator& simulator_;
   SimulatorNodeConfig config_;
-  ros::Publisher image_, info_, lidar_, perfect_;
+  ros::Publisher image_, info_, lidar_, perfect_, range_;
   std::vector<sensor_msgs::ImagePtr> pool_;  ///< images that subscribers have let go of are used again
   RangeScan scan_;
 };

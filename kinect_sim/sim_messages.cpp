@@ -99,6 +99,18 @@ std::vector<geometry_msgs::TransformStamped> mount_transforms(const Simulator& s
           transform("base_link", "laser", T_base_laser, stamp_s)};
 }
 
+sensor_msgs::Range range_message(Simulator& simulator, const FrameRequest& request) {
+  sensor_msgs::Range message;
+  message.header.stamp.fromSec(request.stamp_s);
+  message.header.frame_id = kOpticalFrame;
+  message.radiation_type = sensor_msgs::Range::INFRARED;
+  message.field_of_view = 0.001f;
+  message.min_range = 0.05f;
+  message.max_range = 50.0f;
+  message.range = simulator.range_ahead_m(request);
+  return message;
+}
+
 visualization_msgs::MarkerArray people_message(const Simulator& simulator) {
   visualization_msgs::MarkerArray message;
   for (const PersonState& person : simulator.people()) {

@@ -4,6 +4,7 @@
 #include <nav_msgs/Odometry.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
+#include <sensor_msgs/Range.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include "kinect_sim/simulator.h"
@@ -23,6 +24,8 @@ geometry_msgs::TransformStamped odometry_transform(const Simulator& simulator);
 nav_msgs::Odometry ground_truth_message(const Simulator& simulator);
 /// base_link -> camera_link -> camera_depth_optical_frame, and base_link -> laser
 std::vector<geometry_msgs::TransformStamped> mount_transforms(const Simulator& simulator);
+/// A single-point laser beside the camera, looking along its axis: the calibrator's truth.
+sensor_msgs::Range range_message(Simulator& simulator, const FrameRequest& request);
 visualization_msgs::MarkerArray people_message(const Simulator& simulator);
 
 }  // namespace knav

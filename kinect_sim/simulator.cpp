@@ -270,6 +270,12 @@ void Simulator::scan_perfect(const FrameRequest& request, double height_m, Range
   cast_scan(request, request.pose_at(request.stamp_s), height_m, kRays, scan);
 }
 
+float Simulator::range_ahead_m(const FrameRequest& request) {
+  rendering_->scene.update(request.dynamic);
+  const Eigen::Isometry3f T = (isometry(request.pose_at(request.stamp_s)) * T_base_optical()).cast<float>();
+  return rendering_->scene.cast(T.translation(), T.linear().col(2), 50.0f);
+}
+
 void Simulator::cast_scan(const FrameRequest& request, const Pose2& T_world_sensor, double height_m, int rays,
                           RangeScan* scan) {
   rendering_->scene.update(request.dynamic);

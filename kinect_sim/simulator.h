@@ -83,6 +83,8 @@ class Simulator {
   void scan_lidar(const FrameRequest& request, RangeScan* scan);
   /// A perfect scan all round at a height above base_link, 3,600 rays.
   void scan_perfect(const FrameRequest& request, double height_m, RangeScan* scan);
+  /// True distance along the camera's optical axis; +Inf if there is nothing within 50 m.
+  float range_ahead_m(const FrameRequest& request);
   Pose2 T_base_laser() const;
 
   /// Puts the robot elsewhere (kidnaps it): odometry does not notice. UserError if something stands there.

@@ -30,9 +30,7 @@ struct SimulatorNodeConfig : SimulatorConfig {
              "Height of the perfect scan's plane.");
   }
   std::vector<std::string> validate() const {
-    std::vector<std::string> faults = SimulatorConfig::validate();
-    if (world.empty()) faults.push_back("'world' is missing; give the path of a world file.");
-    return faults;
+    return SimulatorConfig::validate();  // 'world' is asked for where it is needed: programs take it as an argument
   }
 };
 

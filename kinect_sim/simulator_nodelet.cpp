@@ -48,6 +48,9 @@ class SimulatorNodelet : public NodeletBase {
 
   void start() override {
     config_ = read_parameters<SimulatorNodeConfig>(getPrivateNodeHandle());
+    if (config_.world.empty()) {
+      throw UserError(getPrivateNodeHandle().getNamespace() + ": 'world' is missing; give the path of a world file.");
+    }
     simulator_ = std::make_unique<Simulator>(load_world(config_.world), config_);
     ros::NodeHandle& handle = getNodeHandle();
     frames_ = std::make_unique<FramePublisher>(handle, *simulator_, config_);
