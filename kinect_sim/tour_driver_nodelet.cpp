@@ -8,34 +8,22 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "core/error.h"
 #include "kinect_sim/tour.h"
+#include "kinect_sim/tour_driver_config.h"
 #include "ros_common/conversions.h"
 #include "ros_common/nodelet_base.h"
 #include "ros_common/parameters.h"
 
 namespace knav {
 
-struct TourDriverConfig {
-  std::string script;
-  std::string start_after;
-  double start_delay_s = 1.0;
-
-  template <class Visitor>
-  void visit(Visitor& v) {
-    v.text("script", script, "Path of the tour script.");
-    v.text("start_after", start_after, "A topic whose first message lets the tour begin; empty: at once.");
-    v.number("start_delay_s", start_delay_s, 0, 600, "s", "Simulated time to wait before the tour.");
-  }
-  std::vector<std::string> validate() const {
-    if (script.empty()) return {"'script' is missing; give the path of a tour script."};
-    return {};
-  }
-};
-
 /// A person with a joystick: drives a script on the true pose and presses the button at its marks.
 class TourDriverNodelet : public NodeletBase {
   void start() override {
     config_ = read_parameters<TourDriverConfig>(getPrivateNodeHandle());
+    if (config_.script.empty()) {
+      throw UserError(getPrivateNodeHandle().getNamespace() + ": 'script' is missing; give the path of a tour script.");
+    }
     driver_ = std::make_unique<TourDriver>(load_tour(config_.script));
     ros::NodeHandle& handle = getNodeHandle();
     command_ = handle.advertise<geometry_msgs::Twist>("cmd_vel", 5);
