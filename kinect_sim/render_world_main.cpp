@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "core/error.h"
 #include "core/file_io.h"
 #include "kinect_sim/simulator.h"
 #include "kinect_sim/tour.h"

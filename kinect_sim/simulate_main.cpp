@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/config.h"
+#include "core/error.h"
 #include "core/file_io.h"
 #include "kinect_sim/simulator_node_config.h"
 #include "kinect_sim/tour_recorder.h"
