@@ -35,61 +35,87 @@ void project_row_pinhole(const RowProjection& p, int first, int count, std::int3
   }
 }
 
-/// atan2 to about 1e-5 rad, written so that every target computes the same bytes.
-inline float angle_of(float y, float x) {
-  const float ax = std::fabs(x), ay = std::fabs(y);
-  const float high = ax > ay ? ax : ay, low = ax > ay ? ay : ax;
-  const float t = low / (high > 1e-12f ? high : 1e-12f);
-  const float t2 = t * t;
-  float a = ((((-0.0117212f * t2 + 0.05265332f) * t2 - 0.11643287f) * t2 + 0.19354346f) * t2 - 0.33262347f) * t2;
-  a = (a + 0.99997726f) * t;
-  a = ay > ax ? 1.57079632679f - a : a;
-  a = x < 0.0f ? 3.14159265359f - a : a;
-  return y < 0.0f ? -a : a;
-}
-
+/// atan2 to about 1e-5 rad of every cell of the row, written so that every target computes the same bytes. In passes
+/// without branches, which the compiler turns into vector code.
 KNAV_MULTIVERSION
-void project_row_angular(const RowProjection& p, int first, int count, std::int32_t* column, float* distance) {
-  const auto columns = static_cast<float>(p.columns);
-  const float turn = 6.28318530718f * std::fabs(p.column_scale);
+void project_row_angular(const RowProjection& p, int first, int count, std::int32_t* column, float* distance,
+                         float* angle) {
   for (int k = 0; k < count; ++k) {
     const float dx = p.first_dx + p.resolution * static_cast<float>(first + k);
     const float x = p.cos_yaw * dx + p.sin_yaw * p.dy;
     const float y = p.cos_yaw * p.dy - p.sin_yaw * dx;
-    float u = p.column_shift + p.column_scale * angle_of(y, x);
-    u = u < 0.0f ? u + turn : u;  // a scan may start anywhere on the circle
-    u = u >= turn ? u - turn : u;
-    const float bounded = u < columns ? u : columns;
-    column[k] = bounded >= 0.0f && bounded < columns ? static_cast<std::int32_t>(bounded) : -1;
+    const float ax = std::fabs(x), ay = std::fabs(y);
+    const float low = ax < ay ? ax : ay, high = ax < ay ? ay : ax;
+    const float t = low / (high + 1e-12f);
+    const float t2 = t * t;
+    const float a = ((((-0.0117212f * t2 + 0.05265332f) * t2 - 0.11643287f) * t2 + 0.19354346f) * t2 - 0.33262347f) * t2;
+    const float octant = (a + 0.99997726f) * t;
+    // Mirrored as the signs say, by arithmetic: 1 or 0 each.
+    const float steep = static_cast<float>(ay > ax), backward = static_cast<float>(x < 0.0f);
+    const float quadrant = octant + steep * (1.57079632679f - 2.0f * octant);
+    const float half = quadrant + backward * (3.14159265359f - 2.0f * quadrant);
+    angle[k] = std::copysign(half, y);
     distance[k] = std::sqrt(dx * dx + p.dy * p.dy);
+  }
+  const auto columns = static_cast<float>(p.columns);
+  const float turn = 6.28318530718f * std::fabs(p.column_scale);
+  for (int k = 0; k < count; ++k) {
+    float u = p.column_shift + p.column_scale * angle[k];
+    u += turn * (static_cast<float>(u < 0.0f) - static_cast<float>(u >= turn));  // it may start anywhere on the circle
+    u = u < -1.0f ? -1.0f : u;
+    u = u > columns ? columns : u;
+    const bool seen = u >= 0.0f && u < columns;
+    column[k] = seen ? static_cast<std::int32_t>(u) : -1;
   }
 }
 
-/// The part of row dy (absolute offset from the sensor) that lies in the disc and, for a narrow view, in its wedge.
+/// The part of the row at height dy over the sensor that lies in the disc of its reach and in its view.
 bool row_span(const TsdfObservation& o, double dy, double* low, double* high) {
   const double reach = o.reach_m;
   const double square = reach * reach - dy * dy;
   if (square <= 0.0) return false;
   *high = std::sqrt(square);
   *low = -*high;
-  if (!o.pinhole) return true;
-  const double c = std::cos(o.T_map_sensor.yaw_rad), s = std::sin(o.T_map_sensor.yaw_rad);
-  // Edge rays, one column wider than the view. Points p with cross(right, p) >= 0 and cross(left, p) <= 0.
+  // Edge rays, one column wider than the view.
   const double columns = static_cast<double>(o.columns());
-  const double right_slope = (columns - o.cx_px) / o.fx_px, left_slope = (-1.0 - o.cx_px) / o.fx_px;
-  const double rx = c + s * right_slope, ry = s - c * right_slope;
-  const double lx = c + s * left_slope, ly = s - c * left_slope;
-  const auto clip = [&](double a, double b) {  // a dx + b >= 0
-    if (a > 1e-12) {
-      *low = std::max(*low, -b / a);
-    } else if (a < -1e-12) {
-      *high = std::min(*high, -b / a);
-    } else if (b < 0.0) {
-      *high = *low - 1.0;
-    }
+  double first, last;
+  if (o.pinhole) {
+    first = -std::atan((-1.0 - o.cx_px) / o.fx_px);
+    last = -std::atan((columns - o.cx_px) / o.fx_px);
+  } else {
+    first = o.angle_min_rad - o.angle_increment_rad;
+    last = o.angle_min_rad + o.angle_increment_rad * columns;
+  }
+  const double right = o.T_map_sensor.yaw_rad + std::min(first, last);
+  const double left = o.T_map_sensor.yaw_rad + std::max(first, last);
+  if (left - right >= 2.0 * kPi - 0.02) return true;
+  // The half planes left of the right edge and right of the left edge: a narrow view is their intersection, a wide
+  // one their union.
+  struct Span {
+    double low, high;
   };
-  clip(-ry, rx * dy);  // cross(right, p) = rx dy - ry dx
-  clip(ly, -lx * dy);  // -cross(left, p)
+  const auto clipped = [&](double a, double b) {  // where a dx + b >= 0
+    Span span{*low, *high};
+    if (a > 1e-9) {
+      span.low = std::max(span.low, -b / a);
+    } else if (a < -1e-9) {
+      span.high = std::min(span.high, -b / a);
+    } else if (b < -1e-6) {
+      span.high = span.low - 1.0;
+    }
+    return span;
+  };
+  const Span r = clipped(-std::sin(right), std::cos(right) * dy);
+  const Span l = clipped(std::sin(left), -std::cos(left) * dy);
+  if (left - right <= kPi) {
+    *low = std::max(r.low, l.low);
+    *high = std::min(r.high, l.high);
+  } else {
+    const bool r_empty = r.low > r.high, l_empty = l.low > l.high;
+    if (r_empty && l_empty) return false;
+    *low = r_empty ? l.low : l_empty ? r.low : std::min(r.low, l.low);
+    *high = r_empty ? l.high : l_empty ? r.high : std::max(r.high, l.high);
+  }
   return *low <= *high;
 }
 
@@ -116,6 +142,7 @@ TsdfGrid::TsdfGrid(const TsdfConfig& config, double half_size_m) : config_(confi
   contradictions_.resize(count);
   row_column_.resize(static_cast<std::size_t>(size_));
   row_distance_m_.resize(static_cast<std::size_t>(size_));
+  row_angle_rad_.resize(static_cast<std::size_t>(size_));
   clear();
 }
 
@@ -239,7 +266,8 @@ void TsdfGrid::apply_row(const TsdfObservation& o, int iy, int from, int to) {
   } else {
     p.column_scale = 1.0f / o.angle_increment_rad;
     p.column_shift = 0.5f - o.angle_min_rad / o.angle_increment_rad;
-    project_row_angular(p, from, count, row_column_.data(), row_distance_m_.data());
+    project_row_angular(p, from, count, row_column_.data(), row_distance_m_.data(),
+                        row_angle_rad_.data());
   }
   const auto floor_m = static_cast<float>(config_.weight_range_floor_m);
   const float floor2 = floor_m * floor_m;

@@ -123,6 +123,7 @@ class TsdfGrid {
   std::vector<std::uint8_t> contradictions_;
   std::vector<std::int32_t> row_column_;  ///< scratch of one row: the observation's column of each cell, or -1
   std::vector<float> row_distance_m_;     ///< ... and its distance from the sensor
+  std::vector<float> row_angle_rad_;
   std::uint64_t contradicted_ = 0;
 };
 

@@ -34,11 +34,11 @@ struct FilterConfig {
   int particles = 1000;
   int readings = 120;
   std::string alignment_cost = "normalized";
-  double temperature = 0.008;
+  double temperature = 0.003;
   double paper_temperature = 0.02;
   double unknown_price = 0.6;
   int refinements = 2;
-  double odometry_learning_m = 10.0;
+  double odometry_learning_m = 0.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
