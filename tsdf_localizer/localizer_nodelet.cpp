@@ -189,7 +189,12 @@ bool LocalizerNodelet::on_set_map(nav_msgs::SetMap::Request& request, nav_msgs::
 bool LocalizerNodelet::clock_jumped_back(double now_s) {
   if (!scan_clock_.jumped_back(now_s)) return false;
   NODELET_WARN("localizer: the clock jumped back; starting anew.");
-  tf_.clear();
+  // tf2's listener clears the buffer by itself when ROS time jumps, but not when only the stamps do
+  try {
+    const auto T = tf_.lookupTransform(config_.odom_frame_id, config_.base_frame_id, ros::Time(0));
+    if (T.header.stamp.toSec() > now_s + 1.0) tf_.clear();
+  } catch (const tf2::TransformException&) {
+  }
   inbox_->clear();
   broadcaster_->forget();
   localizer_->reset();

@@ -38,9 +38,9 @@ double signed_distance_to(const Block& b, const Point2& p) {
 }  // namespace
 
 double Building::range(const Point2& from, double angle_rad, double range_max_m) const {
+  const double dx = std::cos(angle_rad), dy = std::sin(angle_rad);
   double nearest = kInf;
-  for (const Block& b : blocks)
-    nearest = std::min(nearest, enter(b, from, std::cos(angle_rad), std::sin(angle_rad)));
+  for (const Block& b : blocks) nearest = std::min(nearest, enter(b, from, dx, dy));
   return nearest <= range_max_m ? nearest : kInf;
 }
 

@@ -18,6 +18,7 @@ constexpr double kRate_hz = 15.0;
 
 ScanModel kinect(double seen_rad) {
   ScanModel model;
+  model.rays = 1440;
   model.noise_m = 0.01;
   model.noise_per_range_squared = 0.002;
   model.fresh_fov_rad = 57.0 * kPi / 180.0;

@@ -24,6 +24,7 @@ const std::vector<Point2> kTour = {{3.5, 3.0},  {3.5, 8.0},  {10.5, 8.0}, {10.5,
 /// What scan_360 looks like: 57 deg fresh and as noisy as a Kinect, the rest from the local map, with holes.
 ScanModel kinect() {
   ScanModel model;
+  model.rays = 1440;
   model.noise_m = 0.01;
   model.noise_per_range_squared = 0.002;
   model.fresh_fov_rad = 57.0 * kPi / 180.0;
