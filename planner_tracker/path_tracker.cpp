@@ -1,0 +1,190 @@
+#include "planner_tracker/path_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace knav {
+namespace {
+
+constexpr double kStep_m = 0.04;
+/// Of the hard clearance, what the tracker insists on: the rest is for the cells' size and the pose's noise.
+constexpr double kInsist = 0.4;
+constexpr double kNearEnd_m = 0.4;
+
+}  // namespace
+
+PathTracker::PathTracker(const PlannerTrackerConfig& config)
+    : config_(config), stop_radius_m_(config.robot_radius + kInsist * config.clearance.hard_m) {}
+
+void PathTracker::reset() { turning_ = false; }
+
+double PathTracker::approach(double from, double to, double step) const {
+  return to > from ? std::min(to, from + step) : std::max(to, from - step);
+}
+
+double PathTracker::clearance_m(const TrackInput& input, double x_m, double y_m) const {
+  const Point2 p = input.T_map_base * Point2{x_m, y_m};
+  return std::min(input.scan->clearance_m(x_m, y_m), input.layer->clearance_m(p.x_m, p.y_m));
+}
+
+PathTracker::Rollout PathTracker::roll_out(const TrackInput& input, double curvature, double length_m, double near_m,
+                                           bool backwards) const {
+  Rollout out;
+  const double here = clearance_m(input, 0.0, 0.0);
+  out.least_clearance_m = here;
+  // Standing too near to something already, it may move, but not come nearer.
+  double demanded = std::min(stop_radius_m_, here - 0.005);
+  double yaw = 0.0;
+  const double step = backwards ? -kStep_m : kStep_m;
+  for (double s = 0.0; s < length_m; s += kStep_m) {
+    const double middle = yaw + 0.5 * curvature * step;
+    const double x = out.end_x_m + step * std::cos(middle), y = out.end_y_m + step * std::sin(middle);
+    const double c = clearance_m(input, x, y);
+    if (c < demanded) break;
+    demanded = std::min(stop_radius_m_, std::max(demanded, c - 0.03));
+    yaw += curvature * step;
+    out.end_x_m = x;
+    out.end_y_m = y;
+    out.free_m = s + kStep_m;
+    if (out.free_m <= near_m) out.least_clearance_m = std::min(out.least_clearance_m, c);
+  }
+  return out;
+}
+
+double PathTracker::straight_free_m(const TrackInput& input, double bearing_rad, double length_m) const {
+  double demanded = std::min(stop_radius_m_, clearance_m(input, 0.0, 0.0) - 0.005);
+  double s = 0.0;
+  for (; s < length_m; s += kStep_m) {
+    const double c = clearance_m(input, (s + kStep_m) * std::cos(bearing_rad), (s + kStep_m) * std::sin(bearing_rad));
+    if (c < demanded) break;
+    demanded = std::min(stop_radius_m_, std::max(demanded, c - 0.03));
+  }
+  return std::min(s, length_m);
+}
+
+TrackOutput PathTracker::stop(const TrackInput& input) const {
+  TrackOutput out;
+  out.v_mps = approach(input.v_mps, 0.0, config_.tracking.stop_decel_mps2 * input.dt_s);
+  out.w_radps = approach(input.w_radps, 0.0, config_.acc_lim_theta * input.dt_s);
+  return out;
+}
+
+TrackOutput PathTracker::turn(const TrackInput& input, double error_rad) const {
+  TrackOutput out;
+  out.kind = TrackOutput::Kind::kTurning;
+  out.v_mps = approach(input.v_mps, 0.0, config_.tracking.stop_decel_mps2 * input.dt_s);
+  // Braking at 60 % of what the wheels can do ends the turn without overshoot.
+  double w = std::min(config_.max_vel_theta, std::sqrt(2.0 * 0.6 * config_.acc_lim_theta * std::abs(error_rad)));
+  w = std::max(w * std::min(1.0, std::abs(error_rad) / 0.1), config_.tracking.min_in_place_vel_theta);
+  if (std::abs(error_rad) < 0.01) w = 0.0;
+  out.w_radps = approach(input.w_radps, std::copysign(w, error_rad), config_.acc_lim_theta * input.dt_s);
+  return out;
+}
+
+TrackOutput PathTracker::creep(const TrackInput& input, double distance_m) const {
+  const bool backwards = distance_m < 0.0;
+  const double top = backwards ? -config_.min_vel_x : config_.tracking.slow_mps;
+  const Rollout ahead = roll_out(input, 0.0, std::min(std::abs(distance_m), 0.5), 0.5, backwards);
+  TrackOutput out = stop(input);
+  if (ahead.free_m < std::min(std::abs(distance_m), 0.06)) {
+    out.kind = TrackOutput::Kind::kBlocked;
+    out.obstacle = input.T_map_base * Point2{ahead.end_x_m, ahead.end_y_m};
+    return out;
+  }
+  const double v = std::min({top, std::sqrt(2.0 * 0.7 * config_.acc_lim_x * std::abs(distance_m)),
+                             std::sqrt(2.0 * config_.acc_lim_x * ahead.free_m)});
+  out.v_mps = approach(input.v_mps, std::copysign(v, distance_m), config_.acc_lim_x * input.dt_s);
+  return out;
+}
+
+TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
+  const TrackingConfig& t = config_.tracking;
+  const double share = std::clamp(input.v_mps / config_.max_vel_x, 0.0, 1.0);
+  double lookahead = t.lookahead_m * (0.6 + 0.4 * share) + path.offset_m();
+  // Not across a corner: the straight line to the point must be as open as the robot's own place allows.
+  const Pose2 T_base_map = input.T_map_base.inverse();
+  const double here = clearance_m(input, 0.0, 0.0);
+  const double wanted = std::min({config_.hard_radius_m() - 0.02, here - 0.005});
+  Point2 target;
+  for (;; lookahead *= 0.75) {
+    target = T_base_map * path.point_at(path.at_m() + lookahead);
+    const double length = std::hypot(target.x_m, target.y_m);
+    bool open = true;
+    for (double s = kStep_m; s < length && open; s += kStep_m) {
+      open = clearance_m(input, target.x_m * s / length, target.y_m * s / length) >= wanted;
+    }
+    if (open || lookahead < 0.2) break;
+  }
+  const double distance = std::hypot(target.x_m, target.y_m);
+  const double bearing = std::atan2(target.y_m, target.x_m);
+
+  const bool near_end = path.remaining_m() < kNearEnd_m;
+  const double turn_first = near_end ? 0.6 * t.turn_first_rad : t.turn_first_rad;
+  if (turning_ ? std::abs(bearing) > t.turned_rad : std::abs(bearing) > turn_first) {
+    turning_ = true;
+    // Half a turn may go either way: keep to the one begun.
+    const bool about_face = std::abs(bearing) > 2.8 && std::abs(input.w_radps) > 0.1;
+    return turn(input, about_face ? std::copysign(bearing, input.w_radps) : bearing);
+  }
+  turning_ = false;
+
+  double curvature = 2.0 * std::sin(bearing) / std::max(distance, 0.1);
+  const double look = std::max(0.5, config_.max_vel_x * t.horizon_s);
+  const double reach = std::min(look, path.remaining_m() + 0.02);
+  Rollout ahead = roll_out(input, curvature, reach, 0.6, false);
+  const double enough = std::min(reach - 0.01, 0.35);
+  if (ahead.free_m < enough) {
+    // Something the plan does not know yet. An arc beside the nominal one that stays near the path?
+    double best = 1e9, best_curvature = curvature;
+    Rollout best_rollout;
+    for (int i = -8; i <= 8; ++i) {
+      const double k = curvature + 0.4 * i;
+      if (i == 0 || std::abs(k) > 3.5) continue;
+      const Rollout r = roll_out(input, k, std::min(reach, 0.8), 0.6, false);
+      if (r.free_m < enough) continue;
+      const double off = std::hypot(r.end_x_m - target.x_m, r.end_y_m - target.y_m);
+      const double cost = off + 0.05 * std::abs(i) + 0.5 * std::max(0.0, config_.preferred_radius_m() - r.least_clearance_m);
+      if (cost < best && r.end_x_m > 0.1) {
+        best = cost;
+        best_curvature = k;
+        best_rollout = r;
+      }
+    }
+    if (best < 0.8) {
+      curvature = best_curvature;
+      ahead = best_rollout;
+    }
+  }
+  if (ahead.free_m < 0.06 && reach > 0.06) {
+    TrackOutput out = std::abs(bearing) > t.turned_rad ? turn(input, bearing) : stop(input);
+    out.v_mps = 0.0;
+    out.kind = TrackOutput::Kind::kBlocked;
+    out.obstacle = input.T_map_base * Point2{ahead.end_x_m, ahead.end_y_m};
+    return out;
+  }
+
+  // Every limit has its own reason; the lowest holds.
+  const double near_share = std::clamp((ahead.least_clearance_m - config_.hard_radius_m()) /
+                                           std::max(0.01, config_.preferred_radius_m() - config_.hard_radius_m()), 0.0, 1.0);
+  double v = t.slow_mps + (config_.max_vel_x - t.slow_mps) * near_share;
+  v = std::min(v, config_.max_vel_x);
+  v *= std::clamp(1.0 - 0.8 * (std::abs(bearing) - 0.2) / t.turn_first_rad, 0.15, 1.0);
+  if (std::abs(curvature) > 1e-6) v = std::min(v, config_.max_vel_theta / std::abs(curvature));
+  v = std::min(v, std::sqrt(2.0 * 0.7 * config_.acc_lim_x * std::max(0.0, path.remaining_m())) + 0.01);
+  const double a = t.stop_decel_mps2, delay = t.reaction_s;
+  bool brake = false;
+  if (ahead.free_m < reach - 0.01) {
+    const double room = std::max(0.0, ahead.free_m - 0.05);
+    const double v_stop = a * (std::sqrt(delay * delay + 2.0 * room / a) - delay);
+    brake = v_stop < v;
+    v = std::min(v, v_stop);
+  }
+  TrackOutput out;
+  const double down = (brake ? t.stop_decel_mps2 : config_.acc_lim_x) * input.dt_s;
+  out.v_mps = v < input.v_mps ? std::max(v, input.v_mps - down) : std::min(v, std::max(input.v_mps, 0.0) + config_.acc_lim_x * input.dt_s);
+  out.w_radps = approach(input.w_radps, std::clamp(out.v_mps * curvature, -config_.max_vel_theta, config_.max_vel_theta),
+                         config_.acc_lim_theta * input.dt_s);
+  return out;
+}
+
+}  // namespace knav

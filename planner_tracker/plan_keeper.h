@@ -1,0 +1,60 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/pose2.h"
+#include "planner_tracker/combined_map.h"
+#include "planner_tracker/grid_planner.h"
+#include "planner_tracker/path.h"
+#include "planner_tracker/planner_tracker_config.h"
+
+namespace knav {
+
+/// Replans, and decides what to make of the result: keeps the old plan unless the new one is clearly better, so that
+/// maps that shift against each other do not make the robot turn to and fro (the live-lock the paper speaks of), and
+/// where the way is closed for now goes there to look.
+class PlanKeeper {
+ public:
+  enum class Outcome {
+    kToGoal,        ///< path() leads to the goal
+    kToNearby,      ///< something unexpected covers the goal: path() leads to a free point near it
+    kToBlockage,    ///< only the unchanged map has a way; path() leads up to where it is closed now: blockage()
+    kGoalOccupied,  ///< the robot cannot stand there, now or by the map: at()
+    kGoalUnknown,
+    kNoPath,        ///< not even the unchanged map has a way
+    kStartBlocked,  ///< the robot stands in something
+  };
+
+  explicit PlanKeeper(const PlannerTrackerConfig& config);
+
+  void set_map(const CombinedMap& map);
+  void start_goal() { path_.clear(); }
+  Outcome replan(const CombinedMap& map, const Point2& robot, const Point2& goal);
+  /// True if the last replan() replaced the path by another.
+  bool switched() const { return switched_; }
+  int switches() const { return switches_; }
+
+  Path& path() { return path_; }
+  const Path& path() const { return path_; }
+  const Point2& at() const { return at_; }
+  GridPlanner& planner() { return planner_; }
+
+ private:
+  double old_cost_m(const MapLayer& layer, const Point2& robot);
+  void take(const std::vector<Point2>& path);
+  /// Keeps the beginning of a way, up to where the layer closes it (at_). False if nothing of it is left.
+  bool cut_at_blockage(const MapLayer& layer, std::vector<Point2>* way);
+
+  PlannerTrackerConfig config_;
+  GridPlanner planner_;
+  Path path_;
+  Outcome path_kind_ = Outcome::kToGoal;
+  PlanResult result_;
+  std::vector<Point2> rest_;
+  Point2 at_;
+  bool switched_ = false;
+  int switches_ = 0;
+};
+
+}  // namespace knav

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <string>
+
+#include "core/pose_buffer.h"
+#include "planner_tracker/goal_watch.h"
+#include "planner_tracker/path_tracker.h"
+#include "planner_tracker/plan_keeper.h"
+#include "planner_tracker/planner_tracker.h"
+#include "planner_tracker/random_moves.h"
+#include "planner_tracker/scan_view.h"
+
+namespace knav {
+
+/// The inside of PlannerTracker: one step is a chain of questions, the first that has an answer commands.
+struct PlannerTracker::State {
+  explicit State(const PlannerTrackerConfig& c);
+
+  Command step(double now_s, const RobotState& robot);
+  void begin(const Pose2& T_map_goal);
+  void end_goal();
+
+  // Each returns true if it decided what to do.
+  bool stopped_by_missing_data(double now_s, const RobotState& robot);
+  bool stopped_by_lost(double now_s, const RobotState& robot);
+  bool arrived(const RobotState& robot);
+  bool replan(double now_s, const RobotState& robot);
+  bool given_up(double now_s, const RobotState& robot);
+  bool avoiding(double now_s, const RobotState& robot);
+  void drive(double now_s, const RobotState& robot);
+
+  void act(Activity activity, const TrackOutput& output);
+  /// Ends the goal as failed.
+  void fail(FailureCode code, const Point2& at, std::string reason);
+  void explain(const char* text) {
+    if (explanation != text) explanation = text;
+  }
+  double free_way(const RobotState& robot, double bearing_rad, bool localized) const;
+
+  PlannerTrackerConfig config;
+  CombinedMap map;
+  PlanKeeper keeper;
+  PathTracker tracker;
+  RandomMoves moves;
+  ScanView scan;
+  PoseBuffer odometry{512};
+  GoalWatch watch;
+
+  bool has_goal = false, ending = false;
+  Pose2 goal;
+  bool latched = false, goal_started = false;
+  double goal_start_s = 0.0, goal_allowed_s = 0.0;
+  Failure failure;
+  std::string explanation;
+  PlanKeeper::Outcome outcome = PlanKeeper::Outcome::kToGoal;
+  std::vector<Point2> shown_path;
+
+  TrackInput input;
+  Command command;
+  double last_step_s = -1.0;
+  double next_plan_s = -1.0;
+  double missing_since_s = -1.0;
+  double blocked_since_s = -1.0;
+  Point2 blocked_at;
+  int avoidances = 0;
+  double lost_since_s = -1.0, found_since_s = -1.0, turned_rad = 0.0, last_yaw_rad = 0.0;
+  bool lost_turn_done = false;
+  Pose2 T_odom_lost;
+  PlanResult asked;  ///< for make_plan
+};
+
+}  // namespace knav

@@ -1,0 +1,284 @@
+// The questions PlannerTracker::State::step() asks, in its order.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "planner_tracker/planner_tracker_state.h"
+
+namespace knav {
+namespace {
+
+constexpr double kFoundFor_s = 0.5;      ///< localized for this long ends the recovery
+constexpr double kFailedPlanWait_s = 1.0;  ///< a search that finds nothing is the dearest
+constexpr double kReplanOnEnd_m = 0.15;
+
+Point2 position(const Pose2& pose) { return {pose.x_m, pose.y_m}; }
+
+}  // namespace
+
+bool PlannerTracker::State::stopped_by_missing_data(double now_s, const RobotState& robot) {
+  const FreshnessConfig& f = config.freshness;
+  const auto stale = [&](double stamp_s, double limit_s) { return now_s - stamp_s > limit_s; };
+  const char* why = nullptr;
+  if (map.empty()) why = "There is no map yet.";
+  else if (scan.empty()) why = "No scan_360 came yet; is the local mapper running?";
+  else if (stale(scan.stamp_s(), f.scan_s)) why = "The last scan_360 is too old; the camera or the local mapper stopped.";
+  else if (stale(robot.odom_stamp_s, f.pose_s)) why = "The last odometry is too old; the base stopped sending it.";
+  else if (!robot.has_pose) why = "There is no transform from the map to the robot; is the localizer running?";
+  else if (stale(robot.pose_stamp_s, f.pose_s)) why = "The transform from the map to the robot is too old; the localizer stopped.";
+  else if (!is_finite(robot.T_map_base) || !is_finite(robot.T_odom_base)) why = "The robot's pose is not finite.";
+  else if (robot.localization != LocalizationState::kUnknown && stale(robot.localization_stamp_s, f.localization_s)) {
+    why = "The localizer fell silent.";
+  } else if (robot.localization == LocalizationState::kInitializing) why = "The localizer has not started yet; give it an initial pose.";
+  if (why == nullptr) {
+    if (missing_since_s >= 0.0) {
+      missing_since_s = -1.0;
+      explain("");
+    }
+    return false;
+  }
+  if (missing_since_s < 0.0) missing_since_s = now_s;
+  explain(why);
+  // Without eyes the brakes are the base's own: zero at once.
+  act(Activity::kStopped, {});
+  if (now_s - missing_since_s > f.give_up_s) {
+    fail(FailureCode::kNoSensorData, position(robot.T_map_base), fmt::format("{} Given up after {:.0f} s.", why, f.give_up_s));
+  }
+  return true;
+}
+
+double PlannerTracker::State::free_way(const RobotState&, double bearing_rad, bool localized) const {
+  constexpr double kFar_m = 1.5;
+  const double radius = tracker.stop_radius_m();
+  if (localized) {
+    // By scan and map together, as far as the footprint goes; known only.
+    return tracker.straight_free_m(input, bearing_rad, kFar_m);
+  }
+  // The map is of no use: only where the scan knows what is there.
+  return std::min(kFar_m, scan.free_m(bearing_rad, radius + config.clearance.hard_m, true));
+}
+
+bool PlannerTracker::State::stopped_by_lost(double now_s, const RobotState& robot) {
+  const bool lost = robot.localization == LocalizationState::kLost;
+  if (lost_since_s < 0.0) {
+    if (!lost) return false;
+    lost_since_s = now_s;
+    lost_turn_done = false;
+    turned_rad = 0.0;
+    last_yaw_rad = robot.T_odom_base.yaw_rad;
+    T_odom_lost = robot.T_odom_base;
+    moves.end();
+    keeper.start_goal();
+    explain("The localizer does not know where the robot is.");
+  }
+  if (!lost) {
+    // Not on the first good word: stands until it is sure.
+    if (found_since_s < 0.0) found_since_s = now_s;
+    act(Activity::kLostTurning, tracker.stop(input));
+    if (now_s - found_since_s < kFoundFor_s) return true;
+    lost_since_s = found_since_s = -1.0;
+    moves.end();
+    explain("");
+    next_plan_s = -1.0;
+    watch.start(now_s);
+    return false;
+  }
+  found_since_s = -1.0;
+  if (now_s - lost_since_s > config.recovery.lost_timeout_s) {
+    fail(FailureCode::kLost, position(robot.T_map_base),
+         fmt::format("Not localized for {:.0f} s, after looking round and wandering.", config.recovery.lost_timeout_s));
+    return true;
+  }
+  turned_rad += normalize_angle_rad(robot.T_odom_base.yaw_rad - last_yaw_rad);
+  last_yaw_rad = robot.T_odom_base.yaw_rad;
+  if (!lost_turn_done && std::abs(turned_rad) < 2.0 * kPi) {
+    TrackOutput turn = tracker.stop(input);
+    const double step = config.acc_lim_theta * input.dt_s;
+    if (std::abs(turn.v_mps) < 0.01) {
+      turn.w_radps = std::clamp(config.recovery.lost_turn_radps, input.w_radps - step, input.w_radps + step);
+    }
+    act(Activity::kLostTurning, turn);
+    return true;
+  }
+  if (!lost_turn_done) {
+    lost_turn_done = true;
+    moves.start(3);
+  }
+  if (!moves.active()) {
+    // Looks round again from the new place.
+    lost_turn_done = false;
+    turned_rad = 0.0;
+    act(Activity::kLostWandering, tracker.stop(input));
+    return true;
+  }
+  const TrackOutput move = moves.step(input, robot.T_odom_base, [&](double bearing) {
+    const double way = free_way(robot, bearing, false);
+    const Pose2 end = robot.T_odom_base * Pose2{way * std::cos(bearing), way * std::sin(bearing), 0.0};
+    const double beyond = distance_m(end, T_odom_lost) - config.recovery.wander_radius_m;
+    return beyond > 0.0 ? way - beyond : way;
+  });
+  act(Activity::kLostWandering, move);
+  return true;
+}
+
+bool PlannerTracker::State::arrived(const RobotState& robot) {
+  const Pose2 T_base_goal = robot.T_map_base.inverse() * goal;
+  const double distance = std::hypot(T_base_goal.x_m, T_base_goal.y_m);
+  if (!latched) {
+    // Not at the tolerance's rim, if driving on still brings it nearer.
+    const bool nearest = distance < 0.4 * config.xy_goal_tolerance || T_base_goal.x_m < 0.3 * distance || input.v_mps < 0.03;
+    latched = distance < config.xy_goal_tolerance && nearest;
+  } else if (!config.latch_xy_goal_tolerance && distance > config.xy_goal_tolerance) {
+    latched = false;
+  } else if (distance > 3.0 * config.xy_goal_tolerance + 0.2) {
+    latched = false;  // pushed, or relocalized
+  }
+  if (!latched) return false;
+  const double error = T_base_goal.yaw_rad;
+  const bool still = std::abs(input.v_mps) < 0.01 && std::abs(robot.v_mps) < 0.05;
+  if (std::abs(error) < config.yaw_goal_tolerance && still) {
+    end_goal();
+    command = {};
+    command.activity = Activity::kReached;
+    command.finished = true;
+    return true;
+  }
+  act(Activity::kAligning, std::abs(error) < 0.5 * config.yaw_goal_tolerance ? tracker.stop(input) : tracker.turn(input, error));
+  return true;
+}
+
+bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
+  if (now_s < next_plan_s) return false;
+  next_plan_s = now_s + 1.0 / config.planner_frequency - 0.5 / config.controller_frequency;
+  const bool first = goal_allowed_s > 1e8;
+  outcome = keeper.replan(map, position(robot.T_map_base), position(goal));
+  using Outcome = PlanKeeper::Outcome;
+  const Point2& at = keeper.at();
+  switch (outcome) {
+    case Outcome::kToGoal:
+      explain("");
+      break;
+    case Outcome::kToNearby:
+      explain("Something stands on the goal; going near it.");
+      break;
+    case Outcome::kToBlockage:
+      next_plan_s = now_s + kFailedPlanWait_s;
+      explanation = fmt::format("The way is closed at ({:.2f}, {:.2f}) m.", at.x_m, at.y_m);
+      break;
+    case Outcome::kGoalOccupied:
+      fail(FailureCode::kGoalOccupied, at,
+           fmt::format("The robot cannot stand at the goal: ({:.2f}, {:.2f}) m is occupied.", at.x_m, at.y_m));
+      return true;
+    case Outcome::kGoalUnknown:
+      fail(FailureCode::kGoalUnknown, at,
+           fmt::format("The goal lies in or beside unknown space, at ({:.2f}, {:.2f}) m.", at.x_m, at.y_m));
+      return true;
+    case Outcome::kNoPath:
+      fail(FailureCode::kNoPath, at,
+           fmt::format("No way leads to the goal; the nearest place looked at is ({:.2f}, {:.2f}) m.", at.x_m, at.y_m));
+      return true;
+    case Outcome::kStartBlocked:
+      next_plan_s = now_s + kFailedPlanWait_s;
+      explain("The robot stands in or against something.");
+      break;
+  }
+  if (first && outcome == Outcome::kToGoal) {
+    goal_allowed_s = 60.0 + config.planning.slowness * keeper.path().length_m() / config.max_vel_x;
+  }
+  return false;
+}
+
+bool PlannerTracker::State::given_up(double now_s, const RobotState& robot) {
+  keeper.path().advance(position(robot.T_map_base));
+  watch.progress(now_s, keeper.path().remaining_m() + keeper.path().offset_m(), keeper.switched());
+  const bool stuck = watch.without_progress_s(now_s) > config.planning.blocked_timeout_s;
+  const bool slow = now_s - goal_start_s > goal_allowed_s;
+  if (!stuck && !slow) return false;
+  using Outcome = PlanKeeper::Outcome;
+  if (outcome == Outcome::kStartBlocked) {
+    fail(FailureCode::kStartOccupied, position(robot.T_map_base), "The robot stands in something and found no way out.");
+    return true;
+  }
+  Point2 at = outcome == Outcome::kToGoal ? (blocked_since_s >= 0.0 ? blocked_at : position(robot.T_map_base)) : keeper.at();
+  const char* what = outcome == Outcome::kToNearby ? "Something stands on the goal" : "The way is closed";
+  if (stuck) {
+    fail(FailureCode::kBlocked, at,
+         fmt::format("{} at ({:.2f}, {:.2f}) m and no other way was found for {:.0f} s.", what, at.x_m, at.y_m,
+                     config.planning.blocked_timeout_s));
+  } else {
+    fail(FailureCode::kBlocked, at,
+         fmt::format("Given up after {:.0f} s: the way to the goal took far longer than planned.", goal_allowed_s));
+  }
+  return true;
+}
+
+bool PlannerTracker::State::avoiding(double now_s, const RobotState& robot) {
+  const bool driving = !moves.active() && (command.activity == Activity::kDriving || keeper.path().remaining_m() > 0.3);
+  const double dithering = watch.dithering_s(now_s, robot.T_odom_base, driving, config.oscillation_distance);
+  if (!moves.active()) {
+    const bool waited = blocked_since_s >= 0.0 && now_s - blocked_since_s > config.planning.controller_patience;
+    const bool oscillating = config.oscillation_timeout > 0.0 && dithering > config.oscillation_timeout;
+    const bool stuck = outcome == PlanKeeper::Outcome::kStartBlocked && watch.without_progress_s(now_s) > config.planning.controller_patience;
+    if (!waited && !oscillating && !stuck) return false;
+    blocked_since_s = -1.0;
+    watch.dithering_s(now_s, robot.T_odom_base, false, 0.0);
+    ++avoidances;
+    moves.start(2);
+    explanation = waited        ? "Something stays in the way; trying random moves towards open space."
+                  : oscillating ? "Driving without getting on; trying random moves towards open space."
+                                : "No way out of this place; trying random moves towards open space.";
+    tracker.reset();
+  }
+  const TrackOutput move = moves.step(input, robot.T_odom_base, [&](double bearing) { return free_way(robot, bearing, true); });
+  act(Activity::kAvoiding, move);
+  if (!moves.active()) {
+    next_plan_s = -1.0;
+    keeper.start_goal();
+  }
+  return true;
+}
+
+void PlannerTracker::State::drive(double now_s, const RobotState& robot) {
+  using Outcome = PlanKeeper::Outcome;
+  const Path& path = keeper.path();
+  if (path.empty()) {
+    act(Activity::kWaiting, tracker.stop(input));
+    return;
+  }
+  const bool to_goal = outcome == Outcome::kToGoal;
+  const double remaining = path.remaining_m() + path.offset_m();
+  if (!to_goal && remaining < kReplanOnEnd_m) {
+    // Arrived where it is closed: looks at it.
+    const Point2 p = robot.T_map_base.inverse() * keeper.at();
+    const double bearing = std::atan2(p.y_m, p.x_m);
+    act(Activity::kWaiting, std::abs(bearing) > 0.2 ? tracker.turn(input, bearing) : tracker.stop(input));
+    return;
+  }
+  if (to_goal && config.min_vel_x < 0.0 && remaining < 0.3) {
+    // A goal just overshot, straight behind: back up over what was just driven, if it is still seen free.
+    const Point2 p = robot.T_map_base.inverse() * position(goal);
+    if (p.x_m < -0.02 && std::abs(p.y_m) < 0.3 * std::abs(p.x_m) &&
+        scan.free_m(kPi, tracker.stop_radius_m(), true) > -p.x_m + 0.05) {
+      const TrackOutput back = tracker.creep(input, p.x_m);
+      if (back.kind != TrackOutput::Kind::kBlocked) {
+        act(Activity::kDriving, back);
+        return;
+      }
+    }
+  }
+  const TrackOutput out = tracker.follow(input, path);
+  if (out.kind == TrackOutput::Kind::kBlocked) {
+    if (blocked_since_s < 0.0) blocked_since_s = now_s;
+    blocked_at = out.obstacle;
+    act(Activity::kWaiting, out);
+    return;
+  }
+  blocked_since_s = -1.0;
+  act(out.kind == TrackOutput::Kind::kTurning ? Activity::kTurning
+      : to_goal                               ? Activity::kDriving
+                                              : Activity::kApproaching,
+      out);
+}
+
+}  // namespace knav
