@@ -69,7 +69,8 @@ int Debander::remove_bands(cv::Mat* depth_m) {
   for (int u = 0; u < width; ++u) {
     const double step = step_per_m_[static_cast<std::size_t>(u)];
     bool largest = std::abs(step) > kSmallest;
-    for (int i = std::max(0, u - kSide / 2); largest && i <= std::min(width - 1, u + kSide / 2); ++i) {
+    // A line across a step answers with the opposite sign beside it: the largest within a side wins.
+    for (int i = std::max(0, u - kSide); largest && i <= std::min(width - 1, u + kSide); ++i) {
       const double other = std::abs(step_per_m_[static_cast<std::size_t>(i)]);
       largest = i == u || (i < u ? other < std::abs(step) : other <= std::abs(step));
     }

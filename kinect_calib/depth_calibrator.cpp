@@ -113,15 +113,13 @@ DepthCalibration DepthCalibrator::fit() {
                     walls_.size(), walls_.size() == 1 ? "" : "s"));
   }
   DepthCalibration calibration = layout_;
+  offsets_known_ = false;
   calibration.trained_min_m = walls_.front().distance_m;
   calibration.trained_max_m = walls_.back().distance_m;
-  // Tilts, one scale and the tiles' offsets are linear in each other's absence: a few rounds settle them.
-  for (int round = 0; round < 12; ++round) {
+  for (int round = 0; round < 2; ++round) {
+    fit_scale_and_tilts(&calibration);
     fit_offsets(&calibration);
-    fit_scale(&calibration);
-    if (config_.fit_wall_tilt) fit_tilt(calibration);
   }
-  fit_offsets(&calibration);
   fit_quadratics(&calibration);
   mend_tiles(&calibration);
   return calibration;
@@ -147,50 +145,54 @@ void DepthCalibrator::fit_offsets(DepthCalibration* calibration) const {
   }
 }
 
-/// One scale for the whole sensor (focal length and baseline are not exactly nominal): per tile it would take
-/// up what little the offsets leave and extrapolate it.
-void DepthCalibrator::fit_scale(DepthCalibration* calibration) const {
-  double product = 0.0, square = 1.0 / (0.01 * 0.01);  // prior: 1 %
+/// One scale for the whole sensor (focal length and baseline are not exactly nominal; per tile it would take
+/// up what little the offsets leave, and extrapolate it) and each wall's tilt, jointly, with the tiles'
+/// offsets eliminated: fitted in turns instead, tilts and offsets creep towards each other over hundreds of
+/// rounds. Tilts that grow with the distance look exactly like an offset that is linear across the image; so
+/// a tilt is one common to all walls (the sensor's mount), free, and a small one of each wall.
+void DepthCalibrator::fit_scale_and_tilts(DepthCalibration* calibration) {
+  const auto walls = static_cast<Eigen::Index>(walls_.size());
+  const Eigen::Index scale = 2 * walls, common_x = scale + 1, common_y = scale + 2, unknowns = scale + 3;
+  const auto precision = [](double sd) { return 1.0 / (sd * sd); };
+  Eigen::VectorXd prior = Eigen::VectorXd::Constant(unknowns, precision(config_.fit_wall_tilt ? 0.01 : 1e-9));
+  prior[scale] = precision(0.01);
+  prior[common_x] = prior[common_y] = precision(config_.fit_wall_tilt ? 0.1 : 1e-9);
+  Eigen::MatrixXd A = prior.asDiagonal();
+  Eigen::VectorXd b = Eigen::VectorXd::Zero(unknowns);
+  Eigen::MatrixXd J(walls, unknowns);
+  Eigen::VectorXd constant(walls), weights(walls);
   for (std::size_t tile = 0; tile < calibration->tile_count(); ++tile) {
-    double weights = 0.0, mean_q = 0.0, mean_t = 0.0;
-    for (const Wall& wall : walls_) {
+    J.setZero();
+    constant.setZero();
+    weights.setZero();
+    for (Eigen::Index i = 0; i < walls; ++i) {
+      const Wall& wall = walls_[static_cast<std::size_t>(i)];
       if (!wall.has(tile)) continue;
-      const double w = weight(wall);
-      weights += w;
-      mean_q += w * wall.measured_per_m(tile);
-      mean_t += w * (true_per_m(wall, tile) - wall.measured_per_m(tile));
+      const double measured = wall.measured_per_m(tile);
+      J(i, 2 * i) = J(i, common_x) = tile_x_[tile] / wall.distance_m;
+      J(i, 2 * i + 1) = J(i, common_y) = tile_y_[tile] / wall.distance_m;
+      J(i, scale) = -measured;
+      constant[i] = 1.0 / wall.distance_m - measured;
+      const double residual = true_per_m(wall, tile) - (1.0 + calibration->inverse_depth_scale) * measured -
+                              calibration->inverse_depth_offset_per_m[tile];
+      weights[i] = weight(wall) * (offsets_known_ ? huber(residual * std::sqrt(weight(wall)), 2.5) : 1.0);
     }
-    if (weights <= 0.0) continue;
-    mean_q /= weights;
-    mean_t /= weights;
-    for (const Wall& wall : walls_) {
-      if (!wall.has(tile)) continue;
-      const double q = wall.measured_per_m(tile) - mean_q;
-      product += weight(wall) * q * (true_per_m(wall, tile) - wall.measured_per_m(tile) - mean_t);
-      square += weight(wall) * q * q;
-    }
+    const double total = weights.sum();
+    if (total <= 0.0) continue;
+    const Eigen::RowVectorXd mean = weights.transpose() * J / total;
+    J.rowwise() -= mean;
+    constant.array() -= weights.dot(constant) / total;
+    A += J.transpose() * weights.asDiagonal() * J;
+    b -= J.transpose() * weights.asDiagonal() * constant;
   }
-  calibration->inverse_depth_scale = std::clamp(product / square, -0.1, 0.1);
-}
-
-void DepthCalibrator::fit_tilt(const DepthCalibration& calibration) {
-  for (Wall& wall : walls_) {
-    Eigen::Matrix2d A =
-        Eigen::Matrix2d::Identity() * std::pow(config_.sensor_sd_per_m / 0.02, 2);  // prior: 1 deg
-    Eigen::Vector2d b = Eigen::Vector2d::Zero();
-    for (std::size_t tile = 0; tile < calibration.tile_count(); ++tile) {
-      if (!wall.has(tile)) continue;
-      const double residual = (1.0 + calibration.inverse_depth_scale) * wall.measured_per_m(tile) +
-                              calibration.inverse_depth_offset_per_m[tile] - 1.0 / wall.distance_m;
-      const Eigen::Vector2d gradient = Eigen::Vector2d(tile_x_[tile], tile_y_[tile]) / wall.distance_m;
-      const double w = huber(residual, 20.0 * config_.sensor_sd_per_m);
-      A += w * gradient * gradient.transpose();
-      b += w * residual * gradient;
-    }
-    const Eigen::Vector2d tilt = A.ldlt().solve(b);
-    wall.tilt_x = std::clamp(tilt.x(), -0.1, 0.1);
-    wall.tilt_y = std::clamp(tilt.y(), -0.1, 0.1);
+  const Eigen::VectorXd solution = A.ldlt().solve(b);
+  for (Eigen::Index i = 0; i < walls; ++i) {
+    Wall& wall = walls_[static_cast<std::size_t>(i)];
+    wall.tilt_x = std::clamp(solution[2 * i] + solution[common_x], -0.2, 0.2);
+    wall.tilt_y = std::clamp(solution[2 * i + 1] + solution[common_y], -0.2, 0.2);
   }
+  calibration->inverse_depth_scale = std::clamp(solution[scale], -0.1, 0.1);
+  offsets_known_ = true;
 }
 
 void DepthCalibrator::fit_quadratics(DepthCalibration* calibration) const {

@@ -60,8 +60,7 @@ class DepthCalibrator {
   };
   double true_per_m(const Wall& wall, std::size_t tile) const;
   double weight(const Wall& wall) const;
-  void fit_tilt(const DepthCalibration& calibration);
-  void fit_scale(DepthCalibration* calibration) const;
+  void fit_scale_and_tilts(DepthCalibration* calibration);
   void fit_offsets(DepthCalibration* calibration) const;
   void fit_quadratics(DepthCalibration* calibration) const;
   void mend_tiles(DepthCalibration* calibration);
@@ -73,6 +72,7 @@ class DepthCalibrator {
   std::vector<Wall> walls_;
   Debander debander_;
   cv::Mat frame_;
+  bool offsets_known_ = false;
   int filled_tiles_ = 0;
 };
 

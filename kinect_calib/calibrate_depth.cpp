@@ -1,0 +1,281 @@
+// calibrate_depth: frames of a flat wall at known distances -> the sensor's depth correction and a report.
+#include <fmt/format.h>
+#include <sensor_msgs/Range.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "core/config.h"
+#include "core/error.h"
+#include "core/file_io.h"
+#include "core/progress.h"
+#include "kinect_calib/depth_calibrator.h"
+#include "kinect_calib/depth_corrector.h"
+#include "kinect_calib/depth_messages.h"
+#include "ros_common/bag_reader.h"
+#include "ros_common/command_line.h"
+
+namespace knav {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string input, out, validate, camera_info, device, report, json;
+  std::string depth_topic = "camera/depth/image_raw", info_topic = "camera/depth/camera_info",
+              range_topic = "range";
+  double range_offset_m = 0.0;
+  int tile_px = 16;
+  bool keep_bands = false, square = false;
+};
+
+const char* const kHelp =
+    R"(SOURCE is a folder with distances.csv (lines `file,distance_m`; PNG, 16 bit, mm, 0 invalid) or a bag with depth
+images and a sensor_msgs/Range topic. Distances: from the camera to the wall along the optical axis, 0.5 to 4 m in steps
+of 5-15 %, several frames at each.
+The JSON holds device, tile_px, filled_tiles (count), inverse_depth_scale, and the lists training and validation, each
+entry with distance_m, frames (count) and, relative to the distance, mean_bias_before, mean_bias_after,
+mean_bias_after_paper, tile_bias_p95_before, tile_bias_p95_after, tile_bias_p95_after_paper (95th percentile over tiles
+of the absolute bias; paper: the quadratic model).)";
+
+RawCamera default_camera(int width_px, int height_px) {
+  RawCamera camera;
+  const double focal_px = 585.0 * width_px / 640.0;
+  camera.raw = {width_px, height_px, focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1)};
+  camera.rectified = camera.raw;
+  return camera;
+}
+
+/// A file as camera_calibration writes it.
+RawCamera read_camera_info(const std::string& path) {
+  const YAML::Node file = load_yaml_file(path);
+  const auto data = [&](const char* key, std::size_t count) {
+    std::vector<double> values;
+    try {
+      values = file[key]["data"].as<std::vector<double>>();
+    } catch (const YAML::Exception&) {
+      throw UserError(fmt::format("{}: '{}/data' is missing or no list of numbers.", path, key));
+    }
+    if (count > 0 && values.size() != count)
+      throw UserError(fmt::format("{}: '{}' must have {} numbers.", path, key, count));
+    return values;
+  };
+  RawCamera camera;
+  try {
+    camera.raw.width_px = file["image_width"].as<int>();
+    camera.raw.height_px = file["image_height"].as<int>();
+  } catch (const YAML::Exception&) {
+    throw UserError(path + ": 'image_width' or 'image_height' is missing.");
+  }
+  const std::vector<double> K = data("camera_matrix", 9), P = data("projection_matrix", 12);
+  camera.distortion = data("distortion_coefficients", 0);
+  camera.rectified = camera.raw;
+  camera.raw.fx_px = K[0], camera.raw.fy_px = K[4], camera.raw.cx_px = K[2], camera.raw.cy_px = K[5];
+  camera.rectified.fx_px = P[0], camera.rectified.fy_px = P[5], camera.rectified.cx_px = P[2],
+  camera.rectified.cy_px = P[6];
+  return camera;
+}
+
+struct Frame {
+  std::string file;
+  double distance_m;
+};
+std::vector<Frame> read_distances(const std::string& folder) {
+  const std::string path = (fs::path(folder) / "distances.csv").string();
+  std::istringstream text(read_text_file(path));
+  std::vector<Frame> frames;
+  std::string line;
+  for (int number = 1; std::getline(text, line); ++number) {
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (line.empty() || line[0] == '#') continue;
+    const std::size_t comma = line.find(',');
+    Frame frame;
+    frame.file = line.substr(0, comma);
+    char* end = nullptr;
+    const std::string number_text = comma == std::string::npos ? "" : line.substr(comma + 1);
+    frame.distance_m = std::strtod(number_text.c_str(), &end);
+    if (number_text.empty() || end == number_text.c_str() || !(frame.distance_m > 0.0)) {
+      if (number == 1) continue;  // a heading
+      throw UserError(fmt::format("{}: line {}: expected `file,distance_m`.", path, number));
+    }
+    frames.push_back(frame);
+  }
+  if (frames.empty()) throw UserError(path + ": names no frames; write lines `file,distance_m`.");
+  return frames;
+}
+
+/// Rectifies, but corrects nothing.
+class Loader {
+ public:
+  explicit Loader(const Options& options) : options_(options), corrector_(DepthCorrectionConfig{}) {
+    if (!options.camera_info.empty()) camera_ = read_camera_info(options.camera_info);
+  }
+
+  void load(const std::string& source, const std::string& stage, DepthCalibrator* calibrator) {
+    if (fs::is_directory(source)) {
+      load_folder(source, stage, calibrator);
+    } else {
+      load_bag(source, stage, calibrator);
+    }
+  }
+
+ private:
+  void add(const std::string& where, const cv::Mat& raw, double distance_m, DepthCalibrator* calibrator) {
+    if (camera_.raw.width_px == 0) camera_ = default_camera(raw.cols, raw.rows);
+    if (!corrector_.correct(raw, camera_, &metres_)) throw UserError(where + ": " + corrector_.fault());
+    try {
+      calibrator->add_frame(metres_, camera_.rectified, distance_m);
+    } catch (const UserError& error) {
+      throw UserError(where + ": " + error.what());
+    }
+  }
+
+  void load_folder(const std::string& folder, const std::string& stage, DepthCalibrator* calibrator) {
+    const std::vector<Frame> frames = read_distances(folder);
+    Progress progress(stage);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      stop_if_interrupted();
+      const std::string path = (fs::path(folder) / frames[i].file).string();
+      const cv::Mat image = cv::imread(path, cv::IMREAD_UNCHANGED);
+      if (image.empty()) throw UserError(path + ": cannot be read as an image; distances.csv names it.");
+      if (image.type() != CV_16UC1)
+        throw UserError(path + ": must be a PNG with one channel of 16 bits (mm).");
+      add(path, image, frames[i].distance_m, calibrator);
+      progress.update(static_cast<double>(i + 1) / static_cast<double>(frames.size()), frames[i].file);
+    }
+  }
+
+  void load_bag(const std::string& path, const std::string& stage, DepthCalibrator* calibrator) {
+    const BagReader bag(path);
+    bag.require_topic(options_.depth_topic);
+    bag.require_topic(options_.range_topic);
+    Progress progress(stage);
+    double range_m = 0.0, range_s = -1e9;
+    int used = 0;
+    bag.for_each({options_.depth_topic, options_.info_topic, options_.range_topic},
+                 [&](const rosbag::MessageInstance& message, double done) {
+                   if (const auto range = message.instantiate<sensor_msgs::Range>()) {
+                     range_m = range->range + options_.range_offset_m;
+                     range_s = std::isfinite(range->range) ? message.getTime().toSec() : -1e9;
+                   } else if (const auto info = message.instantiate<sensor_msgs::CameraInfo>()) {
+                     if (options_.camera_info.empty()) camera_ = raw_camera_from(*info);
+                   } else if (const auto image = message.instantiate<sensor_msgs::Image>()) {
+                     if (message.getTime().toSec() - range_s > 0.5) return;  // no distance for this frame
+                     cv::Mat view;
+                     std::string fault;
+                     if (!view_depth(*image, &view, &fault)) throw UserError(path + ": " + fault);
+                     add(path, view, range_m, calibrator);
+                     progress.update(done, fmt::format("{} frames", ++used));
+                   }
+                 });
+    if (used == 0) throw UserError(path + ": no depth image has a range reading within 0.5 s before it.");
+  }
+
+  const Options& options_;
+  DepthCorrector corrector_;
+  RawCamera camera_;
+  cv::Mat metres_;
+};
+
+nlohmann::json as_json(const std::vector<WallScore>& scores) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const WallScore& s : scores) {
+    list.push_back({{"distance_m", s.distance_m},
+                    {"frames", s.frames},
+                    {"mean_bias_before", s.mean_bias_before},
+                    {"mean_bias_after", s.mean_bias_after},
+                    {"mean_bias_after_paper", s.mean_bias_after_paper},
+                    {"tile_bias_p95_before", s.tile_bias_p95_before},
+                    {"tile_bias_p95_after", s.tile_bias_p95_after},
+                    {"tile_bias_p95_after_paper", s.tile_bias_p95_after_paper}});
+  }
+  return list;
+}
+
+std::string as_table(const std::string& title, const std::vector<WallScore>& scores) {
+  std::string text = fmt::format(
+      "{}: bias in per cent of the distance\n"
+      "                       frame-wide mean          95th percentile of tiles\n"
+      "distance_m  frames   before   after   paper     before   after   paper\n",
+      title);
+  for (const WallScore& s : scores) {
+    text += fmt::format("{:10.3f}  {:6d} {:8.2f} {:7.2f} {:7.2f}   {:8.2f} {:7.2f} {:7.2f}\n", s.distance_m,
+                        s.frames, 100 * s.mean_bias_before, 100 * s.mean_bias_after,
+                        100 * s.mean_bias_after_paper, 100 * s.tile_bias_p95_before,
+                        100 * s.tile_bias_p95_after, 100 * s.tile_bias_p95_after_paper);
+  }
+  return text;
+}
+
+void calibrate(const Options& options) {
+  DepthCalibratorConfig config;
+  config.tile_px = options.tile_px;
+  config.deband = !options.keep_bands;
+  config.fit_wall_tilt = !options.square;
+  Loader loader(options);
+  DepthCalibrator training(config);
+  loader.load(options.input, "reading walls", &training);
+  DepthCalibration calibration = training.fit();
+  calibration.device = options.device;
+
+  std::string report = fmt::format(
+      "Depth calibration of '{}': {} distances, {:.2f} to {:.2f} m; {} of {} tiles filled from "
+      "neighbours; scale {:+.3f} %\n\n",
+      options.device, training.distances(), calibration.trained_min_m, calibration.trained_max_m,
+      training.filled_tiles(), calibration.tile_count(), 100 * calibration.inverse_depth_scale);
+  const std::vector<WallScore> trained = training.score(calibration);
+  report += as_table("Training", trained);
+  nlohmann::json json = {{"device", options.device},
+                         {"tile_px", calibration.tile_px},
+                         {"filled_tiles", training.filled_tiles()},
+                         {"inverse_depth_scale", calibration.inverse_depth_scale},
+                         {"training", as_json(trained)},
+                         {"validation", nlohmann::json::array()}};
+  if (!options.validate.empty()) {
+    config.deband = false;  // at run time nobody removes bands
+    DepthCalibrator validation(config);
+    loader.load(options.validate, "validating", &validation);
+    const std::vector<WallScore> validated = validation.score(calibration);
+    report += "\n" + as_table("Validation", validated);
+    json["validation"] = as_json(validated);
+  }
+  save_depth_calibration(options.out, calibration);
+  if (!options.report.empty()) write_text_atomically(options.report, report);
+  write_json(options.json, json.dump(2));
+  if (options.json != "-")
+    fmt::print("{}\nWritten to {}; give it to depth_correction as calibration_file.\n", report, options.out);
+}
+
+}  // namespace
+}  // namespace knav
+
+int main(int argc, char** argv) {
+  CLI::App app("Learns a depth sensor's systematic error from frames of a flat wall at known distances.");
+  knav::Options options;
+  app.add_option("SOURCE", options.input, "folder with distances.csv, or a bag")->required();
+  app.add_option("--out", options.out, "calibration to write (YAML)")->required();
+  app.add_option("--validate", options.validate, "folder or bag not used in fitting, to score the result on");
+  app.add_option("--camera-info", options.camera_info,
+                 "camera_calibration's YAML: lens to rectify (default: none, or the bag's)");
+  app.add_option("--device", options.device, "serial number or name to note in the file");
+  app.add_option("--tile", options.tile_px, "side of a tile [px]")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  app.add_option("--depth-topic", options.depth_topic, "bag: depth images")->capture_default_str();
+  app.add_option("--info-topic", options.info_topic, "bag: camera_info")->capture_default_str();
+  app.add_option("--range-topic", options.range_topic, "bag: sensor_msgs/Range of the range finder")
+      ->capture_default_str();
+  app.add_option("--range-offset", options.range_offset_m,
+                 "bag: added to each range to get the camera's distance [m]");
+  app.add_flag("--keep-bands", options.keep_bands, "do not remove vertical bands from each frame");
+  app.add_flag("--square", options.square, "the sensor stood exactly square to the wall: fit no tilt");
+  app.add_option("--report", options.report, "write the table to this text file as well");
+  app.add_option("--json", options.json, "write the figures to this file; '-' for standard output");
+  app.footer(knav::kHelp);
+  return knav::run_command(app, argc, argv, [&] { knav::calibrate(options); });
+}
