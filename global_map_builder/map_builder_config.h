@@ -1,0 +1,114 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "global_map_builder/dense_tsdf.h"
+#include "global_map_builder/graph_optimizer.h"
+#include "global_map_builder/submap_matcher.h"
+
+namespace knav {
+
+/// Which frames are kept, and how far the mapper's motion is trusted from one keyframe to the next.
+struct DriveConfig {
+  double frame_distance_m = 0.03;
+  double frame_angle_deg = 1.0;
+  double frame_period_s = 1.0;
+  double keyframe_distance_m = 0.5;
+  double keyframe_angle_deg = 30.0;
+  double position_sd_per_m = 0.02;
+  double position_sd_floor_m = 0.005;
+  double heading_sd_deg_per_m = 0.4;
+  double heading_sd_per_turn = 0.01;
+  double filter_share = 0.05;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.number("frame_distance_m", frame_distance_m, 0, 10, "m", "A frame is kept after this distance ...");
+    v.number("frame_angle_deg", frame_angle_deg, 0, 180, "deg", "... or this turn ...");
+    v.number("frame_period_s", frame_period_s, 0, 3600, "s", "... or this time.");
+    v.number("keyframe_distance_m", keyframe_distance_m, 0.05, 10, "m", "A node of the graph after this distance ...");
+    v.number("keyframe_angle_deg", keyframe_angle_deg, 1, 180, "deg", "... or this turn.");
+    v.number("position_sd_per_m", position_sd_per_m, 1e-4, 1, "m/m",
+             "Position error (sd) of the local mapper per distance, of one metre; grows as the root of the distance.");
+    v.number("position_sd_floor_m", position_sd_floor_m, 1e-4, 1, "m", "Position error (sd) of a step, at least.");
+    v.number("heading_sd_deg_per_m", heading_sd_deg_per_m, 1e-3, 45, "deg/m", "Heading error, likewise.");
+    v.number("heading_sd_per_turn", heading_sd_per_turn, 0, 1, "rad/rad", "Heading error (sd) per angle turned.");
+    v.number("filter_share", filter_share, 0, 1, "",
+             "Share of the mapper's own covariance that is added to a step's.");
+  }
+  std::vector<std::string> validate() const { return {}; }
+};
+
+/// Where two visits of one place are looked for.
+struct ClosureConfig {
+  bool automatic = true;
+  bool buttons = true;
+  double submap_half_length_m = 3.0;
+  double submap_spacing_m = 1.5;
+  double submap_range_max_m = 8.0;
+  double min_path_m = 12.0;
+  double search_base_m = 1.0;
+  double search_per_m = 0.03;
+  double search_max_m = 8.0;
+  double search_angle_base_deg = 6.0;
+  double search_angle_deg_per_m = 0.25;
+  double search_angle_max_deg = 40.0;
+  double button_sd_m = 0.3;
+  double nearest_m = 4.0;
+  int passes = 2;
+  MatchConfig match;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.flag("automatic", automatic, "Look for closures by matching local maps.");
+    v.flag("buttons", buttons, "Use the marks set while driving.");
+    v.number("submap_half_length_m", submap_half_length_m, 0.5, 50, "m",
+             "A local map holds what was seen from this far before a keyframe to this far after it.");
+    v.number("submap_spacing_m", submap_spacing_m, 0.2, 50, "m", "Local maps every so far along the path.");
+    v.number("submap_range_max_m", submap_range_max_m, 1, 50, "m", "They hold readings up to this range.");
+    v.number("min_path_m", min_path_m, 1, 1000, "m", "Two visits lie at least this far apart along the path.");
+    v.number("search_base_m", search_base_m, 0.1, 50, "m", "The search reaches this far ...");
+    v.number("search_per_m", search_per_m, 0, 1, "m/m", "... plus this per distance driven since the last common point ...");
+    v.number("search_max_m", search_max_m, 0.1, 50, "m", "... at most.");
+    v.number("search_angle_base_deg", search_angle_base_deg, 0, 180, "deg", "Likewise for the heading.");
+    v.number("search_angle_deg_per_m", search_angle_deg_per_m, 0, 10, "deg/m", "Likewise for the heading.");
+    v.number("search_angle_max_deg", search_angle_max_deg, 0, 180, "deg", "Likewise for the heading.");
+    v.number("button_sd_m", button_sd_m, 0.01, 5, "m", "How well the robot is put back at a marked place (sd).");
+    v.number("nearest_m", nearest_m, 0.1, 50, "m", "Local maps farther apart than this (and the search) are not compared.");
+    v.integer("passes", passes, 1, 5, "", "Passes over the drive; each starts from the graph that the last one left.");
+    v.group("match", match, "When a match counts.");
+  }
+  std::vector<std::string> validate() const { return {}; }
+};
+
+struct MapBuilderConfig {
+  DriveConfig drive;
+  ClosureConfig closures;
+  GraphOptimizerConfig graph;
+  SurfaceConfig surface;
+  double min_contour_piece_m = 0.25;
+  std::string distance = "exact";
+  double size_max_m = 400.0;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.group("drive", drive, "Frames, keyframes and the edges between them.");
+    v.group("closures", closures, "Visits of the same place.");
+    v.group("graph", graph, "The optimiser.");
+    v.group("surface", surface, "The map's signed distance grid.");
+    v.number("min_contour_piece_m", min_contour_piece_m, 0, 5, "m", "Shorter pieces of contour are noise.");
+    v.choice("distance", distance, {"exact", "paper"},
+             "exact: distance transform of the contour. paper: ray tracing from every cell (minutes).");
+    v.number("size_max_m", size_max_m, 5, 2000, "m", "A map larger than this in either direction is refused as an error.");
+  }
+  std::vector<std::string> validate() const {
+    std::vector<std::string> faults;
+    if (drive.keyframe_distance_m < drive.frame_distance_m) {
+      faults.push_back("drive/keyframe_distance_m must not be below drive/frame_distance_m.");
+    }
+    return faults;
+  }
+};
+
+}  // namespace knav

@@ -1,0 +1,85 @@
+#include "global_map_builder/map_picture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/error.h"
+
+namespace knav {
+namespace {
+
+constexpr int kShift = 4;  // sub-pixel bits of OpenCV's drawing
+
+/// Map to pixels: an even zoom so that the longer side has about 1600 pixels.
+struct Canvas {
+  explicit Canvas(const OccupancyGrid& grid) : geometry(grid.geometry) {
+    const int longer = std::max(geometry.width_cells, geometry.height_cells);
+    zoom = longer <= 1600 ? std::clamp(1600 / std::max(1, longer), 1, 6) : 1600.0 / longer;
+    cv::Mat cells(geometry.height_cells, geometry.width_cells, CV_8UC3);
+    for (int row = 0; row < cells.rows; ++row) {
+      for (int column = 0; column < cells.cols; ++column) {
+        const int value = grid.value[geometry.index(column, cells.rows - 1 - row)];
+        const int gray = value < 0 ? 190 : value > 50 ? 0 : 255;
+        cells.at<cv::Vec3b>(row, column) = cv::Vec3b::all(static_cast<unsigned char>(gray));
+      }
+    }
+    cv::resize(cells, image, {}, zoom, zoom, zoom < 1.0 ? cv::INTER_AREA : cv::INTER_NEAREST);
+  }
+
+  cv::Point at(const Pose2& p) const {
+    const double scale = zoom / geometry.resolution_m * (1 << kShift);
+    return {static_cast<int>((p.x_m - geometry.origin_x_m) * scale),
+            static_cast<int>((geometry.origin_y_m + geometry.height_cells * geometry.resolution_m - p.y_m) * scale)};
+  }
+  void line(const Pose2& a, const Pose2& b, const cv::Scalar& color, int width) {
+    cv::line(image, at(a), at(b), color, width, cv::LINE_AA, kShift);
+  }
+  void scale_bar() {
+    const double width_m = geometry.width_cells * geometry.resolution_m;
+    const double length_m = std::max(1.0, std::pow(10.0, std::floor(std::log10(width_m / 4.0))));
+    const int pixels = static_cast<int>(length_m / geometry.resolution_m * zoom);
+    const cv::Point left(12, image.rows - 12);
+    cv::line(image, left, left + cv::Point(pixels, 0), {0, 0, 0}, 3);
+    cv::putText(image, fmt::format("{:.0f} m", length_m), left + cv::Point(0, -8), cv::FONT_HERSHEY_SIMPLEX, 0.5,
+                {0, 0, 0}, 1, cv::LINE_AA);
+  }
+  void write(const std::string& path) const {
+    if (!cv::imwrite(path, image)) throw UserError(path + ": cannot be written; is the disk full?");
+  }
+
+  GridGeometry geometry;
+  double zoom = 1.0;
+  cv::Mat image;
+};
+
+}  // namespace
+
+void write_map_picture(const std::string& path, const BuiltMap& built) {
+  Canvas canvas(built.map.occupancy);
+  const Trajectory& drive = built.map.trajectory;
+  for (std::size_t i = 1; i < drive.size(); ++i) {
+    const double t = static_cast<double>(i) / static_cast<double>(drive.size());
+    canvas.line(drive[i - 1].T_map_robot, drive[i].T_map_robot, {255 * (1 - t), 60, 255 * t}, 2);
+  }
+  for (const Closure& c : built.closures) {
+    const Pose2& from = built.keyframes[static_cast<std::size_t>(c.from)];
+    const Pose2& to = built.keyframes[static_cast<std::size_t>(c.to)];
+    const cv::Scalar color = c.accepted ? cv::Scalar(0, 160, 0) : cv::Scalar(255, 0, 255);
+    canvas.line(from, to, color, 1);
+    cv::circle(canvas.image, canvas.at(to), 3 << kShift, color, c.source == "button" ? cv::FILLED : 1, cv::LINE_AA, kShift);
+  }
+  canvas.scale_bar();
+  canvas.write(path);
+}
+
+void write_map_picture(const std::string& path, const MapDirectory& map) {
+  Canvas canvas(map.occupancy);
+  canvas.scale_bar();
+  canvas.write(path);
+}
+
+}  // namespace knav

@@ -1,0 +1,223 @@
+#include "global_map_builder/submap_matcher.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace knav {
+namespace {
+
+constexpr double kPointSpacing_m = 0.1;  // as Submap samples its contour
+constexpr float kCoarseReach_m = 0.6f;   // beyond this a point scores nothing
+constexpr double kCoarseStep_m = 0.2;
+constexpr double kFineReach_m = 0.3;
+constexpr double kInlier_m = 0.15;
+constexpr std::size_t kCoarsePoints = 120;
+constexpr std::size_t kPeaks = 8;
+
+struct Candidate {
+  Pose2 pose;
+  double score = 0.0;
+};
+
+bool same_place(const MatchConfig& config, const Pose2& a, const Pose2& b) {
+  return distance_m(a, b) < config.rival_distance_m &&
+         std::fabs(normalize_angle_rad(a.yaw_rad - b.yaw_rad)) < config.rival_angle_deg * kPi / 180.0;
+}
+
+std::vector<SurfacePoint> thin(const std::vector<SurfacePoint>& points, std::size_t count) {
+  std::vector<SurfacePoint> out;
+  const std::size_t take = std::min(count, points.size());
+  for (std::size_t i = 0; i < take; ++i) out.push_back(points[i * points.size() / take]);
+  return out;
+}
+
+/// Every pose of the window on a lattice, scored by the nearest cell; the best of each neighbourhood.
+std::vector<Candidate> search(const MatchConfig& config, const Submap& from, const Submap& to, const Pose2& prior,
+                              const MatchWindow& window) {
+  const std::vector<SurfacePoint> points = thin(to.points(), kCoarsePoints);
+  double reach_m = 1.0;
+  for (const SurfacePoint& p : points) reach_m = std::max(reach_m, static_cast<double>(std::hypot(p.x_m, p.y_m)));
+  const double angle_step = std::min(2.0 * kCoarseStep_m / reach_m, 0.06);
+  const int turns = static_cast<int>(std::ceil(window.angle_rad / angle_step));
+  const int steps = static_cast<int>(std::ceil(window.radius_m / kCoarseStep_m));
+  std::vector<Candidate> all;
+  std::vector<float> x(points.size()), y(points.size());
+  for (int turn = -turns; turn <= turns; ++turn) {
+    const double yaw = prior.yaw_rad + turn * angle_step;
+    const auto c = static_cast<float>(std::cos(yaw)), s = static_cast<float>(std::sin(yaw));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      x[i] = c * points[i].x_m - s * points[i].y_m;
+      y[i] = s * points[i].x_m + c * points[i].y_m;
+    }
+    for (int iy = -steps; iy <= steps; ++iy) {
+      for (int ix = -steps; ix <= steps; ++ix) {
+        if (ix * ix + iy * iy > steps * steps) continue;
+        const double px = prior.x_m + ix * kCoarseStep_m, py = prior.y_m + iy * kCoarseStep_m;
+        float sum = 0.0f;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+          const float d = std::fabs(from.nearest(x[i] + static_cast<float>(px), y[i] + static_cast<float>(py), 1e3f));
+          if (d < kCoarseReach_m) sum += 1.0f - d / kCoarseReach_m;
+        }
+        all.push_back({{px, py, normalize_angle_rad(yaw)}, sum / static_cast<double>(points.size())});
+      }
+    }
+  }
+  // Of equals, the one nearer to the prior.
+  std::stable_sort(all.begin(), all.end(), [&](const Candidate& a, const Candidate& b) {
+    return a.score != b.score ? a.score > b.score : distance_m(a.pose, prior) < distance_m(b.pose, prior);
+  });
+  std::vector<Candidate> peaks;
+  for (const Candidate& candidate : all) {
+    if (peaks.size() == kPeaks || candidate.score < 0.6 * all.front().score) break;
+    const bool taken = std::any_of(peaks.begin(), peaks.end(),
+                                   [&](const Candidate& peak) { return same_place(config, peak.pose, candidate.pose); });
+    if (!taken) peaks.push_back(candidate);
+  }
+  return peaks;
+}
+
+struct Fit {
+  Pose2 pose;
+  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();  ///< of (x, y, yaw), per metre squared of residual
+  double score = 0.0;
+};
+
+/// Gauss-Newton on the signed distance, each point fading out (Tukey) towards kFineReach_m and where the surfaces
+/// face opposite ways, as the two sides of a thin wall do.
+Fit refine(const Submap& from, const Submap& to, const Pose2& start) {
+  Fit fit{start};
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d g = Eigen::Vector3d::Zero();
+    double score = 0.0;
+    const double c = std::cos(fit.pose.yaw_rad), s = std::sin(fit.pose.yaw_rad);
+    for (const SurfacePoint& p : to.points()) {
+      const double rx = c * p.x_m - s * p.y_m, ry = s * p.x_m + c * p.y_m;
+      double d = 0.0;
+      Eigen::Vector2d gradient;
+      if (!from.interpolate(fit.pose.x_m + rx, fit.pose.y_m + ry, &d, &gradient)) continue;
+      if (std::fabs(d) >= kFineReach_m || gradient.norm() < 0.3) continue;
+      const double facing = (c * p.normal_x - s * p.normal_y) * gradient.x() + (s * p.normal_x + c * p.normal_y) * gradient.y();
+      if (facing <= 0.0) continue;
+      const double q = 1.0 - d * d / (kFineReach_m * kFineReach_m);
+      const double w = q * q * std::min(1.0, facing / gradient.norm());
+      const Eigen::Vector3d J(gradient.x(), gradient.y(), -ry * gradient.x() + rx * gradient.y());
+      H += w * J * J.transpose();
+      g += w * d * J;
+      score += w;
+    }
+    fit.hessian = H;
+    fit.score = score / static_cast<double>(std::max<std::size_t>(1, to.points().size()));
+    // A little damping holds directions that nothing constrains.
+    const Eigen::Matrix3d damped = H + Eigen::Vector3d(0.5, 0.5, 2.0).asDiagonal().toDenseMatrix();
+    const Eigen::Vector3d step = damped.ldlt().solve(-g);
+    if (!step.allFinite()) break;
+    const double scale = std::min(1.0, 0.3 / std::max(1e-9, step.head<2>().norm()));
+    fit.pose.x_m += scale * step.x();
+    fit.pose.y_m += scale * step.y();
+    fit.pose.yaw_rad = normalize_angle_rad(fit.pose.yaw_rad + scale * step.z());
+    if (step.head<2>().norm() < 1e-4 && std::fabs(step.z()) < 1e-5) break;
+  }
+  return fit;
+}
+
+struct Agreement {
+  double overlap = 0.0, agreement = 0.0, residual_m = 0.0, surface_m = 0.0;
+};
+
+Agreement agreement_of(const Submap& from, const Submap& to, const Pose2& T_from_to) {
+  const double c = std::cos(T_from_to.yaw_rad), s = std::sin(T_from_to.yaw_rad);
+  double seen = 0.0, inliers = 0.0, squares = 0.0;
+  for (const SurfacePoint& p : to.points()) {
+    const double x = T_from_to.x_m + c * p.x_m - s * p.y_m, y = T_from_to.y_m + s * p.x_m + c * p.y_m;
+    double d = 0.0;
+    Eigen::Vector2d gradient;
+    if (!from.interpolate(x, y, &d, &gradient)) continue;
+    const bool near = std::fabs(d) < kInlier_m;
+    const double facing = (c * p.normal_x - s * p.normal_y) * gradient.x() + (s * p.normal_x + c * p.normal_y) * gradient.y();
+    if (near && facing > 0.3) {
+      inliers += 1.0;
+      squares += d * d;
+      seen += 1.0;
+    } else if (!near && from.known(static_cast<float>(x), static_cast<float>(y))) {
+      seen += 1.0;  // the other submap knows the place and shows no such surface
+    }
+  }
+  Agreement a;
+  a.overlap = to.points().empty() ? 0.0 : seen / static_cast<double>(to.points().size());
+  a.agreement = seen > 0.0 ? inliers / seen : 0.0;
+  a.residual_m = inliers > 0.0 ? std::sqrt(squares / inliers) : 1.0;
+  a.surface_m = inliers * kPointSpacing_m;
+  return a;
+}
+
+/// Map-axes Hessian of `from`'s frame to the edge's error, which lies in the axes of `to`.
+Eigen::Matrix3d information_of(const Fit& fit) {
+  // Neighbouring points share their noise: count one in three, each of 5 cm. Nothing is better known than 2 cm and
+  // 0.3 deg, and a direction left open is known to 1 m.
+  const double per_point = 1.0 / (3.0 * 0.05 * 0.05);
+  const Eigen::Matrix3d weak = Eigen::Vector3d(1.0, 1.0, 30.0).asDiagonal();
+  Eigen::Matrix3d covariance = (fit.hessian * per_point + weak).inverse();
+  covariance += Eigen::Vector3d(4e-4, 4e-4, 2.7e-5).asDiagonal().toDenseMatrix();
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  const double c = std::cos(fit.pose.yaw_rad), s = std::sin(fit.pose.yaw_rad);
+  R.topLeftCorner<2, 2>() << c, -s, s, c;
+  const Eigen::Matrix3d information = (R.transpose() * covariance * R).inverse();
+  return 0.5 * (information + information.transpose());
+}
+
+}  // namespace
+
+MatchResult match_submaps(const MatchConfig& config, const Submap& from, const Submap& to, const Pose2& T_from_to,
+                          const MatchWindow& window) {
+  MatchResult result;
+  result.T_from_to = T_from_to;
+  if (from.empty() || to.empty()) {
+    result.reason = "nothing was seen at one of the two places";
+    return result;
+  }
+  std::vector<Fit> fits;
+  for (const Candidate& peak : search(config, from, to, T_from_to, window)) fits.push_back(refine(from, to, peak.pose));
+  std::stable_sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.score > b.score; });
+  if (fits.empty() || fits.front().score <= 0.0) {
+    result.reason = "no alignment found";
+    return result;
+  }
+  const Fit& best = fits.front();
+  result.T_from_to = best.pose;
+  result.score = best.score;
+  result.information = information_of(best);
+  const Agreement there = agreement_of(from, to, best.pose);
+  const Agreement back = agreement_of(to, from, best.pose.inverse());
+  result.overlap = std::min(there.overlap, back.overlap);
+  result.agreement = std::min(there.agreement, back.agreement);
+  result.residual_m = std::max(there.residual_m, back.residual_m);
+  result.surface_m = std::min(there.surface_m, back.surface_m);
+  for (std::size_t i = 1; i < fits.size(); ++i) {
+    if (same_place(config, fits[i].pose, best.pose)) continue;
+    const Pose2 apart = best.pose.inverse() * fits[i].pose;
+    const Eigen::Vector3d error(apart.x_m, apart.y_m, apart.yaw_rad);
+    if (error.dot(result.information * error) < 9.0) continue;  // along a direction left open
+    result.rival = std::max(result.rival, fits[i].score / best.score);
+  }
+  if (result.surface_m < config.min_surface_m) {
+    result.reason = fmt::format("only {:.1f} m of wall coincide", result.surface_m);
+  } else if (result.overlap < config.min_overlap) {
+    result.reason = fmt::format("overlap {:.2f} is too small", result.overlap);
+  } else if (result.agreement < config.min_agreement) {
+    result.reason = fmt::format("only {:.2f} of what both saw agrees", result.agreement);
+  } else if (result.residual_m > config.max_residual_m) {
+    result.reason = fmt::format("residual {:.3f} m is too large", result.residual_m);
+  } else if (result.rival > config.max_rival) {
+    result.reason = fmt::format("another alignment scores {:.2f} of the best", result.rival);
+  } else {
+    result.accepted = true;
+  }
+  return result;
+}
+
+}  // namespace knav
