@@ -6,7 +6,7 @@
 #include <map>
 
 #include "depth_profile_nodelet/front_end.h"
-#include "global_map_builder/map_builder_config.h"
+#include "global_map_builder/build_map_config.h"
 #include "global_map_builder/map_server_config.h"
 #include "global_map_builder/mapping_recorder_config.h"
 #include "kinect_sim/simulator_node_config.h"
@@ -45,7 +45,7 @@ std::vector<Section> all_sections() {
       section<DepthProfileConfig>("depth_profile", "One depth per image column."),
       section<LocalMapperConfig>("local_mapper", "The sliding-window map, the motion estimate and the 360-degree scan."),
       section<MappingRecorderConfig>("mapping_recorder", "Records the mapping drive."),
-      section<MapBuilderConfig>("map_builder", "From a recording to a map (build_map)."),
+      section<BuildMapConfig>("map_builder", "From a recording to a map (build_map)."),
       section<MapServerConfig>("map_server", "Publishes a map directory."),
       section<LocalizerConfig>("localizer", "Where the robot is in the map."),
       section<PlannerTrackerConfig>("planner_tracker", "Takes the robot to goals."),

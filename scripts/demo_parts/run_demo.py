@@ -120,11 +120,12 @@ class Demo:
         """The simulated Kinect is as wrong as a real one, so it is calibrated as a real one: against a wall."""
         self.line.show("calibrating the depth camera against a wall")
         self.calibration = self.out / "calibration.yaml"
-        walls = self.out / "calibration_walls"
-        self.program("simulate_walls", walls, "--seed", self.options.seed)
-        self.program("calibrate_depth", "--frames", walls, "--out", self.calibration, "--json",
-                     self.out / "calibration.json")
-        shutil.rmtree(walls)
+        walls = self.out / "calibration.bag"
+        self.program("simulate", self.worlds / "flat_wall.yaml", "--script", self.worlds / "flat_wall_tour.yaml",
+                     "--record", walls, "--range", "--depth", "all", "--seed", self.options.seed)
+        self.program("calibrate_depth", walls, "--out", self.calibration, "--json", self.out / "calibration.json",
+                     "--report", self.out / "calibration.txt")
+        walls.unlink()
         self.line.done("calibrated: " + str(self.calibration.relative_to(self.out.parent)))
 
     def simulation(self, people):
