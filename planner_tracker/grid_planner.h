@@ -33,7 +33,9 @@ class GridPlanner {
   /// Prepares the landmarks; `layer` is the map without what changes (seconds on a map of a hectare or more).
   void set_map(const MapLayer& layer);
   /// @param layer same geometry as given to set_map
-  void plan(const MapLayer& layer, const Point2& start, const Point2& goal, PlanResult* result);
+  /// @param landmarks  use the bounds of the map given to set_map: much faster, but a shortcut that opened since (a
+  ///   door shut in the map) may be overlooked. Without them the straight distance is the only bound.
+  void plan(const MapLayer& layer, const Point2& start, const Point2& goal, PlanResult* result, bool landmarks = true);
 
   /// Cost [m] of driving straight, +Inf if something is in the way.
   double segment_cost_m(const MapLayer& layer, const Point2& from, const Point2& to) const;

@@ -24,6 +24,7 @@ struct Options {
   int pairs = 1000;
   int compared = 40;
   bool quick = false;
+  bool no_landmarks = false;
 };
 
 /// CPU time of this thread: others may be using the machine.
@@ -122,7 +123,7 @@ void run(Options options) {
     stop_if_interrupted();
     const Point2 a = random_point(), b = random_point();
     const double begin = now_ms();
-    planner.plan(layer, a, b, &result);
+    planner.plan(layer, a, b, &result, !options.no_landmarks);
     const double spent_ms = now_ms() - begin;
     if (result.code != PlanCode::kOk) {
       unreachable_ms.push_back(spent_ms);
@@ -174,6 +175,7 @@ int main(int argc, char** argv) {
   app.add_option("--pairs", options.pairs, "reachable pairs")->capture_default_str();
   app.add_option("--compared", options.compared, "of them compared with Theta* (slow)")->capture_default_str();
   app.add_flag("--quick", options.quick, "200 pairs, 10 compared");
+  app.add_flag("--no-landmarks", options.no_landmarks, "straight distances as the only bound, to compare");
   app.add_option("--picture", options.picture, "PNG with the first six paths");
   app.add_option("--json", options.json,
                  "FILE or -: pairs, plan_{median,p99,worst}_ms, unreachable_median_ms, length_median_m, "

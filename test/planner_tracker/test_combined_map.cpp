@@ -1,0 +1,135 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/distance_transform.h"
+#include "core/error.h"
+#include "planner_tracker/combined_map.h"
+#include "toy_world.h"
+
+namespace knav {
+namespace {
+
+TEST(Overlay, EveryCombinationOfGlobalAndLocal) {
+  using S = CellState;
+  const struct {
+    S global, local, combined;
+  } table[] = {
+      {S::kUnknown, S::kUnknown, S::kUnknown},   {S::kUnknown, S::kFree, S::kFree},
+      {S::kUnknown, S::kOccupied, S::kOccupied}, {S::kFree, S::kUnknown, S::kFree},
+      {S::kFree, S::kFree, S::kFree},            {S::kFree, S::kOccupied, S::kOccupied},
+      {S::kOccupied, S::kUnknown, S::kOccupied}, {S::kOccupied, S::kFree, S::kFree},
+      {S::kOccupied, S::kOccupied, S::kOccupied}, {S::kKeepout, S::kUnknown, S::kKeepout},
+      {S::kKeepout, S::kFree, S::kKeepout},      {S::kKeepout, S::kOccupied, S::kKeepout},
+  };
+  for (const auto& row : table) EXPECT_EQ(overlay(row.global, row.local), row.combined);
+  // The same through the grids: one cell a row of the table.
+  OccupancyGrid global, keepout, local;
+  global.geometry = keepout.geometry = local.geometry = {12, 1, 0.1, 0.0, 0.0};
+  for (const auto& row : table) {
+    global.value.push_back(row.global == S::kUnknown ? -1 : row.global == S::kOccupied ? 100 : 0);
+    keepout.value.push_back(row.global == S::kKeepout ? 100 : 0);
+    local.value.push_back(row.local == S::kUnknown ? -1 : row.local == S::kOccupied ? 100 : 0);
+  }
+  CombinedMap map(0.5, 65, 25);
+  map.set_global({}, global, keepout);
+  map.set_local(local, Pose2{});
+  for (int i = 0; i < 12; ++i) EXPECT_EQ(map.combined().at(i, 0), table[i].combined) << "row " << i;
+  // Taken away again, the global map is back.
+  map.clear_local();
+  for (int i = 0; i < 12; ++i) EXPECT_EQ(map.combined().at(i, 0), table[i].global) << "row " << i;
+}
+
+TEST(Overlay, MidValuesAreUnknownAndOutsideIsUnknown) {
+  OccupancyGrid grid = room(1.0, 1.0);
+  grid.value[grid.geometry.index(5, 5)] = 40;
+  CombinedMap map(0.5, 65, 25);
+  map.set_global({}, grid, {});
+  EXPECT_EQ(map.combined().at(5, 5), CellState::kUnknown);
+  EXPECT_EQ(map.combined().at(-1, 5), CellState::kUnknown);
+  EXPECT_EQ(map.combined().clearance_m(-3.0, 0.0), 0.0);
+}
+
+TEST(Overlay, ALocalWallTurnedBy30DegreesHasNoHoles) {
+  CombinedMap map(0.5, 65, 25);
+  map.set_global({}, room(6.0, 6.0), {});
+  OccupancyGrid local;
+  local.geometry = {60, 3, 0.05, -1.5, -0.075};
+  local.value.assign(180, 0);
+  for (int x = 0; x < 60; ++x) local.value[local.geometry.index(x, 1)] = 100;
+  const Pose2 T_map_local{3.0, 3.0, kPi / 6.0};
+  map.set_local(local, T_map_local);
+  // Nothing gets from one side to the other through 4-neighbours, and no point of the wall is free.
+  for (double s = -1.45; s < 1.45; s += 0.01) {
+    const Point2 p = T_map_local * Point2{s, 0.0};
+    EXPECT_LE(map.combined().clearance_m(p.x_m, p.y_m), 0.03) << s;
+  }
+}
+
+TEST(Overlay, IncrementalClearanceEqualsThatOfAFreshMap) {
+  RandomStream random(3, random_stream::kTest, 0, 0);
+  OccupancyGrid global = room(9.0, 7.0);
+  for (auto& v : global.value) {
+    if (random.uniform() < 0.01) v = 100;
+  }
+  CombinedMap map(0.7, 65, 25);
+  map.set_global({}, global, {});
+  for (int round = 0; round < 12; ++round) {
+    OccupancyGrid local;
+    local.geometry = {60, 60, 0.05, -1.5, -1.5};
+    for (int i = 0; i < 3600; ++i) {
+      const double u = random.uniform();
+      local.value.push_back(static_cast<std::int8_t>(u < 0.5 ? -1 : u < 0.97 ? 0 : 100));
+    }
+    map.set_local(local, {random.uniform(-1.0, 10.0), random.uniform(-1.0, 8.0), random.uniform(-3.0, 3.0)});
+    std::vector<std::uint8_t> blocked;
+    for (const CellState s : map.combined().state) blocked.push_back(s != CellState::kFree);
+    // Independent: core's transform of the whole grid, in a frame of blocked cells.
+    GridGeometry framed = global.geometry;
+    framed.width_cells += 2;
+    framed.height_cells += 2;
+    std::vector<std::uint8_t> with_frame(framed.cell_count(), 1);
+    for (int y = 0; y < global.geometry.height_cells; ++y) {
+      for (int x = 0; x < global.geometry.width_cells; ++x) {
+        with_frame[framed.index(x + 1, y + 1)] = blocked[global.geometry.index(x, y)];
+      }
+    }
+    const auto exact_m = euclidean_distance_m(framed, with_frame);
+    const int reach = map.combined().reach_cells;
+    for (int y = 0; y < global.geometry.height_cells; ++y) {
+      for (int x = 0; x < global.geometry.width_cells; ++x) {
+        const double cells = static_cast<double>(exact_m[framed.index(x + 1, y + 1)]) / 0.05;
+        const long squared = std::min(std::lround(cells * cells), static_cast<long>((reach + 1) * (reach + 1)));
+        ASSERT_EQ(map.combined().squared_at(x, y), squared) << x << "," << y << " round " << round;
+      }
+    }
+  }
+}
+
+TEST(Overlay, MapsThatDoNotFitTogetherAreRefusedInWords) {
+  CombinedMap map(0.5, 65, 25);
+  EXPECT_THROW(map.set_global({}, {}, {}), UserError);
+  OccupancyGrid keepout = room(2.0, 1.0);
+  try {
+    map.set_global({}, room(1.0, 1.0), keepout);
+    FAIL();
+  } catch (const UserError& error) {
+    EXPECT_NE(std::string(error.what()).find("keepout"), std::string::npos);
+  }
+  EXPECT_TRUE(map.empty());
+}
+
+TEST(Overlay, ADistanceMapAloneMakesAMap) {
+  DistanceMap distance;
+  distance.geometry = {4, 1, 0.1, 0.0, 0.0};
+  distance.distance_m = {std::nanf(""), 0.2f, 0.02f, -0.1f};
+  CombinedMap map(0.5, 65, 25);
+  map.set_global(distance, {}, {});
+  EXPECT_EQ(map.global().at(0, 0), CellState::kUnknown);
+  EXPECT_EQ(map.global().at(1, 0), CellState::kFree);
+  EXPECT_EQ(map.global().at(2, 0), CellState::kOccupied);
+  EXPECT_EQ(map.global().at(3, 0), CellState::kOccupied);
+}
+
+}  // namespace
+}  // namespace knav
