@@ -20,7 +20,6 @@ struct GridPlanner::Search {
 
   PlannerTrackerConfig config;
   ClearancePrice price;
-  LandmarkHeuristic landmarks;
   GridSearch coarse, fine;
   std::vector<Cell> cells, escape;
   std::vector<Point2> points;
@@ -31,7 +30,7 @@ struct GridPlanner::Search {
   void label_parts(const MapLayer& layer);
   bool apart(const MapLayer& layer, const Cell& a, const Cell& b) const;
   bool find_escape(const MapLayer& layer, const Cell& start, Cell* out);
-  bool find_way(const MapLayer& layer, const Cell& start, const Cell& goal, bool bounds, PlanResult* result);
+  bool find_way(const MapLayer& layer, const Cell& start, const Cell& goal, PlanResult* result);
 };
 
 GridPlanner::GridPlanner(const PlannerTrackerConfig& config) : search_(std::make_unique<Search>(config)) {}
@@ -72,7 +71,6 @@ bool GridPlanner::Search::apart(const MapLayer& layer, const Cell& a, const Cell
 void GridPlanner::set_map(const MapLayer& layer) {
   const PlannerTrackerConfig& c = search_->config;
   search_->price = ClearancePrice(layer, c.hard_radius_m(), c.preferred_radius_m(), c.clearance.price);
-  search_->landmarks.build(SearchGraph(layer, search_->price, kStride));
   search_->label_parts(layer);
 }
 
@@ -120,27 +118,24 @@ bool GridPlanner::Search::find_escape(const MapLayer& layer, const Cell& start, 
   return false;
 }
 
-bool GridPlanner::Search::find_way(const MapLayer& layer, const Cell& start, const Cell& goal, bool bounds,
-                                   PlanResult* result) {
-  LandmarkHeuristic* const marks = bounds ? &landmarks : nullptr;
+bool GridPlanner::Search::find_way(const MapLayer& layer, const Cell& start, const Cell& goal, PlanResult* result) {
   if (apart(layer, start, goal)) {
     result->at = {layer.geometry.center_x_m(goal.ix), layer.geometry.center_y_m(goal.iy)};
     return false;
   }
   Cell nearest;
-  bool found = coarse.find(SearchGraph(layer, price, kStride), marks, kStride, start, goal, &cells, &nearest);
+  bool found = coarse.find(SearchGraph(layer, price, kStride), start, goal, &cells, &nearest);
   result->expanded += coarse.expanded();
   if (!found) {
     // A gap that lies between the coarse nodes.
-    found = fine.find(SearchGraph(layer, price, 1), marks, kStride, start, goal, &cells, &nearest);
+    found = fine.find(SearchGraph(layer, price, 1), start, goal, &cells, &nearest);
     result->expanded += fine.expanded();
   }
   if (!found) result->at = {layer.geometry.center_x_m(nearest.ix), layer.geometry.center_y_m(nearest.iy)};
   return found;
 }
 
-void GridPlanner::plan(const MapLayer& layer, const Point2& start, const Point2& goal, PlanResult* result,
-                       bool landmarks) {
+void GridPlanner::plan(const MapLayer& layer, const Point2& start, const Point2& goal, PlanResult* result) {
   Search& s = *search_;
   result->path.clear();
   result->expanded = 0;
@@ -172,7 +167,7 @@ void GridPlanner::plan(const MapLayer& layer, const Point2& start, const Point2&
     result->at = start;
     return;
   }
-  if (!s.find_way(layer, from, to, landmarks, result)) {
+  if (!s.find_way(layer, from, to, result)) {
     result->code = PlanCode::kNoPath;
     return;
   }

@@ -21,21 +21,19 @@ struct PlanResult {
   int expanded = 0;             ///< nodes taken from the open list
 };
 
-/// Shortest clearance-aware paths: A* on every second cell with landmark distances as its heuristic (Goldberg and
-/// Harrelson, "Computing the Shortest Path: A* Search Meets Graph Theory", 2005), then pulled straight where that
-/// is not dearer. Where every second cell finds nothing, every cell is searched. A cell is driven on only if the
+/// Shortest clearance-aware paths: A* on every second cell, 16 neighbours, bucket queue, then pulled straight where
+/// that is not dearer. The straight distance is its only bound: bounds prepared from the map (landmarks) would be
+/// blind to doors that opened since, and 3 ms for 27 m across a hospital need none. Where every second cell finds nothing, every cell is searched. A cell is driven on only if the
 /// whole footprint disc, hard clearance included, lies over free cells.
 class GridPlanner {
  public:
   explicit GridPlanner(const PlannerTrackerConfig& config);
   ~GridPlanner();
 
-  /// Prepares the landmarks; `layer` is the map without what changes (seconds on a map of a hectare or more).
+  /// @param layer  the map without what changes; goals it cannot reach on this layer it refuses at once
   void set_map(const MapLayer& layer);
   /// @param layer same geometry as given to set_map
-  /// @param landmarks  use the bounds of the map given to set_map: much faster, but a shortcut that opened since (a
-  ///   door shut in the map) may be overlooked. Without them the straight distance is the only bound.
-  void plan(const MapLayer& layer, const Point2& start, const Point2& goal, PlanResult* result, bool landmarks = true);
+  void plan(const MapLayer& layer, const Point2& start, const Point2& goal, PlanResult* result);
 
   /// Cost [m] of driving straight, +Inf if something is in the way.
   double segment_cost_m(const MapLayer& layer, const Point2& from, const Point2& to) const;

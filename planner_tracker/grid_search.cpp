@@ -9,8 +9,7 @@ namespace knav {
 
 void GridSearch::open(std::size_t node, std::uint32_t g_mm, std::uint32_t parent, std::uint32_t h_mm) {
   nodes_[node] = {g_mm, h_mm, search_, parent};
-  // The bounds are not quite consistent (rounded, and 0 where a landmark does not reach): f may step back a little
-  // or far ahead. A node opened again later repairs the first; the clamp only delays the second.
+  // Rounding makes f step back a little now and then; a node opened again later repairs that.
   const std::uint32_t bucket = std::clamp((g_mm + h_mm) >> kBucketShift, bucket_, bucket_ + kBuckets - 1);
   ring_[bucket % kBuckets].push_back({static_cast<std::uint32_t>(node), g_mm});
   ++waiting_;
@@ -46,8 +45,8 @@ GridSearch::Flood GridSearch::grow_flood(const SearchGraph& graph) {
   return Flood::kGrowing;
 }
 
-bool GridSearch::find(const SearchGraph& graph, LandmarkHeuristic* landmarks, int landmark_stride, const Cell& start,
-                      const Cell& goal, std::vector<Cell>* cells, Cell* nearest) {
+bool GridSearch::find(const SearchGraph& graph, const Cell& start, const Cell& goal, std::vector<Cell>* cells,
+                      Cell* nearest) {
   expanded_ = 0;
   cells->clear();
   *nearest = start;
@@ -62,25 +61,11 @@ bool GridSearch::find(const SearchGraph& graph, LandmarkHeuristic* landmarks, in
     search_ = 1;
   }
 
-  const int landmark_width = landmarks ? (graph.layer().geometry.width_cells + landmark_stride - 1) / landmark_stride : 0;
-  const auto landmark_node = [&](int ix, int iy) {
-    return static_cast<std::size_t>(iy / landmark_stride) * static_cast<std::size_t>(landmark_width) +
-           static_cast<std::size_t>(ix / landmark_stride);
-  };
-  const bool aimed = landmarks && landmarks->ready();
-  if (aimed) landmarks->aim(landmark_node(start.ix, start.iy), landmark_node(goal.ix, goal.iy));
-  // The bound refers to the landmark node beside the goal, up to a node's diagonal from where the search ends.
   const double cell_mm = 1000.0 * graph.layer().geometry.resolution_m;
-  const auto slack_mm = static_cast<std::uint32_t>(4.0 * cell_mm * landmark_stride);
   const auto bound_mm = [&](int jx, int jy) {
     const double dx = jx * stride - goal.ix, dy = jy * stride - goal.iy;
     // 0.5 % below: lengths of moves are rounded to whole millimetres.
-    auto h = static_cast<std::uint32_t>(0.995 * cell_mm * std::sqrt(dx * dx + dy * dy));
-    if (aimed) {
-      const std::uint32_t l = landmarks->bound_mm(landmark_node(jx * stride, jy * stride));
-      if (l > h + slack_mm) h = l - slack_mm;
-    }
-    return h;
+    return static_cast<std::uint32_t>(0.995 * cell_mm * std::sqrt(dx * dx + dy * dy));
   };
 
   // Nodes within a cell of the start (on every second cell: one, two or four), and likewise of the goal.

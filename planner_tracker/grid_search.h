@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "planner_tracker/landmark_heuristic.h"
 #include "planner_tracker/search_graph.h"
 
 namespace knav {
@@ -16,11 +15,9 @@ struct Cell {
 /// A* between two open cells over a SearchGraph. Buffers are kept from search to search.
 class GridSearch {
  public:
-  /// @param landmarks  tables built for `landmark_stride`, or null
   /// @param cells  of the way found, ends included, neighbours at most two nodes apart
   /// @param nearest  if nothing leads to the goal: of the cells looked at, that which lies nearest to it
-  bool find(const SearchGraph& graph, LandmarkHeuristic* landmarks, int landmark_stride, const Cell& start,
-            const Cell& goal, std::vector<Cell>* cells, Cell* nearest);
+  bool find(const SearchGraph& graph, const Cell& start, const Cell& goal, std::vector<Cell>* cells, Cell* nearest);
   int expanded() const { return expanded_; }
 
  private:

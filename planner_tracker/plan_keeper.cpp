@@ -10,9 +10,6 @@ namespace {
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// Farther from the old path than this, the robot is on another.
 constexpr double kOffPath_m = 0.5;
-/// Every so many plans one looks for shortcuts that the unchanged map does not have, at ten times the cost; what it
-/// finds is then kept as the old plan.
-constexpr int kShortcutEvery = 5;
 
 }  // namespace
 
@@ -71,8 +68,7 @@ PlanKeeper::Outcome PlanKeeper::replan(const CombinedMap& map, const Point2& rob
   switched_ = false;
   const MapLayer& layer = map.combined();
   Outcome kind = Outcome::kToGoal;
-  const bool landmarks = replans_++ % kShortcutEvery != 0;
-  planner_.plan(layer, robot, goal, &result_, landmarks);
+  planner_.plan(layer, robot, goal, &result_);
   if (result_.code == PlanCode::kGoalOccupied || result_.code == PlanCode::kGoalUnknown) {
     at_ = result_.at;
     if (!planner_.open(map.global(), goal)) {
@@ -82,7 +78,7 @@ PlanKeeper::Outcome PlanKeeper::replan(const CombinedMap& map, const Point2& rob
     Point2 nearby;
     if (planner_.nearest_open(layer, goal, config_.planning.goal_snap_m, &nearby)) {
       kind = Outcome::kToNearby;
-      planner_.plan(layer, robot, nearby, &result_, landmarks);
+      planner_.plan(layer, robot, nearby, &result_);
     }
   }
   if (result_.code == PlanCode::kOk) {

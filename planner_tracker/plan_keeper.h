@@ -29,10 +29,7 @@ class PlanKeeper {
   explicit PlanKeeper(const PlannerTrackerConfig& config);
 
   void set_map(const CombinedMap& map);
-  void start_goal() {
-    path_.clear();
-    replans_ = 0;
-  }
+  void start_goal() { path_.clear(); }
   Outcome replan(const CombinedMap& map, const Point2& robot, const Point2& goal);
   /// True if the last replan() replaced the path by another.
   bool switched() const { return switched_; }
@@ -58,7 +55,6 @@ class PlanKeeper {
   Point2 at_;
   bool switched_ = false;
   int switches_ = 0;
-  int replans_ = 0;
 };
 
 }  // namespace knav

@@ -24,7 +24,6 @@ struct Options {
   int pairs = 1000;
   int compared = 40;
   bool quick = false;
-  bool no_landmarks = false;
 };
 
 /// CPU time of this thread: others may be using the machine.
@@ -103,7 +102,7 @@ void run(Options options) {
   GridPlanner planner(config);
   start = now_ms();
   planner.set_map(map.global());
-  const double landmarks_ms = now_ms() - start;
+  const double prepare_ms = now_ms() - start;
   const MapLayer& layer = map.global();
 
   RandomStream random(1, random_stream::kTest, 0, 0);
@@ -123,7 +122,7 @@ void run(Options options) {
     stop_if_interrupted();
     const Point2 a = random_point(), b = random_point();
     const double begin = now_ms();
-    planner.plan(layer, a, b, &result, !options.no_landmarks);
+    planner.plan(layer, a, b, &result);
     const double spent_ms = now_ms() - begin;
     if (result.code != PlanCode::kOk) {
       unreachable_ms.push_back(spent_ms);
@@ -142,7 +141,7 @@ void run(Options options) {
   if (!options.picture.empty()) draw(options.picture, layer, shown);
   const double mean_ratio = ratio.empty() ? std::nan("") : [&] { double s = 0; for (double r : ratio) s += r; return s; }() /
                                                                static_cast<double>(ratio.size());
-  fmt::print("clearance {:.0f} ms, landmarks {:.0f} ms\n", clearance_ms, landmarks_ms);
+  fmt::print("clearance {:.0f} ms, parts {:.0f} ms\n", clearance_ms, prepare_ms);
   fmt::print("{} pairs, length median {:.1f} m: median {:.2f} ms, 99 % {:.2f} ms, worst {:.2f} ms; {:.0f} nodes (median)\n",
              time_ms.size(), quantile(length, 0.5), quantile(time_ms, 0.5), quantile(time_ms, 0.99),
              quantile(time_ms, 1.0), quantile(expanded, 0.5));
@@ -160,7 +159,7 @@ void run(Options options) {
                                {"length_ratio_worst", quantile(ratio, 1.0)},
                                {"unsafe_paths", unsafe},
                                {"clearance_ms", clearance_ms},
-                               {"landmarks_ms", landmarks_ms}};
+                               {"prepare_ms", prepare_ms}};
   write_json(options.json, json.dump(2) + "\n");
 }
 
@@ -175,10 +174,9 @@ int main(int argc, char** argv) {
   app.add_option("--pairs", options.pairs, "reachable pairs")->capture_default_str();
   app.add_option("--compared", options.compared, "of them compared with Theta* (slow)")->capture_default_str();
   app.add_flag("--quick", options.quick, "200 pairs, 10 compared");
-  app.add_flag("--no-landmarks", options.no_landmarks, "straight distances as the only bound, to compare");
   app.add_option("--picture", options.picture, "PNG with the first six paths");
   app.add_option("--json", options.json,
                  "FILE or -: pairs, plan_{median,p99,worst}_ms, unreachable_median_ms, length_median_m, "
-                 "length_ratio_{mean,worst} (to Theta*), unsafe_paths, clearance_ms, landmarks_ms");
+                 "length_ratio_{mean,worst} (to Theta*), unsafe_paths, clearance_ms, prepare_ms");
   return knav::run_command(app, argc, argv, [&] { knav::run(options); });
 }
