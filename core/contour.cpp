@@ -27,13 +27,12 @@ class QuadWalk {
   }
   double leaves_at() const { return std::min(next_x_, next_y_); }
   void step() {
-    if (next_x_ < next_y_) {
-      ix += step_x_;
-      next_x_ += delta_x_;
-    } else {
-      iy += step_y_;
-      next_y_ += delta_y_;
-    }
+    // Without a branch: which way comes next is a coin toss, and a wrong guess costs more than both sums.
+    const bool along_x = next_x_ < next_y_;
+    ix += along_x ? step_x_ : 0;
+    iy += along_x ? 0 : step_y_;
+    next_x_ += along_x ? delta_x_ : 0.0;
+    next_y_ += along_x ? 0.0 : delta_y_;
   }
   int ix, iy;
 
@@ -80,10 +79,11 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
   double unknown_from = 0.0;  // where the present stretch of unknown began
   double positive_at = -1.0;  // the last place where F was known and positive, without unknown since
   float positive_value = 0.0f;
-  float oldest_free = kInf;
   RayEnd end;
+  const auto inside = static_cast<unsigned>(grid.size_cells() - 1);
+  const int first_x = grid.first_x(), first_y = grid.first_y();
   while (entered < length) {
-    if (!grid.contains(walk.ix, walk.iy) || !grid.contains(walk.ix + 1, walk.iy + 1)) break;
+    if (static_cast<unsigned>(walk.ix - first_x) >= inside || static_cast<unsigned>(walk.iy - first_y) >= inside) break;
     const double leaves = std::min(walk.leaves_at(), length);
     const std::uint32_t quad = quads[grid.index(walk.ix, walk.iy)];
     if (quad == kAllFree) {
@@ -114,16 +114,17 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
       }
       unknown_from = leaves;
     }
-    if (unknown_from == leaves) oldest_free = std::min(oldest_free, grid.last_seen_s(walk.ix, walk.iy));
     entered = leaves;
     if (entered >= length) {
-      if (positive_at >= 0.0) end.kind = RayEnd::Kind::kFree;
+      if (positive_at >= 0.0) {
+        end.kind = RayEnd::Kind::kFree;
+        end.last_seen_s = grid.last_seen_s(walk.ix, walk.iy);
+      }
       break;
     }
     walk.step();
   }
   end.range_m = static_cast<float>(entered * grid.resolution_m());
-  end.last_seen_s = oldest_free < kInf ? oldest_free : 0.0f;
   return end;
 }
 

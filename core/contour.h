@@ -40,7 +40,7 @@ void extract_contour(const TsdfGrid& grid, const ContourConfig& config, const Po
 struct RayEnd {
   enum class Kind { kSurface, kFree, kUnknown } kind = Kind::kUnknown;
   float range_m = 0.0f;      ///< of the surface, or where the ray became unknown, or the ray's length
-  float last_seen_s = 0.0f;  ///< window clock of the cells at the surface (the newest of the two), or on the ray
+  float last_seen_s = 0.0f;  ///< window clock of the newest cell at the surface there, or at a free ray's end
 };
 RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, double y_m, double dir_x,
                 double dir_y, double length_m);

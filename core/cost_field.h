@@ -9,8 +9,9 @@
 
 namespace knav {
 
-/// What a reading costs that ends in a cell: 0 on a surface, 1 far from any, quantised to 1/255. Mapper and
-/// localizer build one from their map; alignment_costs() reads it, one random byte (or four) a reading.
+/// What a reading costs that ends in a cell: 0 on a surface, 1 far from any, quantised to 1/255. The localizer makes
+/// one from its map; alignment_costs() reads it. Each cell's word packs its own value with those of its right, upper
+/// and upper right neighbours, so that a bilinear value takes one random read instead of four.
 class CostField {
  public:
   CostField() = default;
@@ -18,17 +19,17 @@ class CostField {
   CostField(const GridGeometry& geometry, double outside_cost);
 
   const GridGeometry& geometry() const { return geometry_; }
-  void set_geometry_origin(double origin_x_m, double origin_y_m);
   void set(int ix, int iy, double cost);
   double at(int ix, int iy) const;
 
-  const std::uint8_t* data() const { return cost_.data(); }
-  std::uint8_t* data() { return cost_.data(); }
+  const std::uint32_t* quads() const { return quad_.data(); }
   std::uint8_t outside() const { return outside_; }
 
  private:
+  void put(int ix, int iy, int byte, std::uint8_t value);
+
   GridGeometry geometry_;
-  std::vector<std::uint8_t> cost_;
+  std::vector<std::uint32_t> quad_;
   std::uint8_t outside_ = 255;
 };
 
@@ -49,6 +50,7 @@ struct WeightedPoints {
 };
 
 /// For each particle, the weighted mean cost in [0, 1] of the readings seen from its pose (equation 7, normalised).
+/// The same bytes on machines with and without AVX2.
 /// @param interpolate bilinear between cell centres; otherwise the nearest cell
 void alignment_costs(const CostField& field, const WeightedPoints& points_robot, const ParticleSet& particles,
                      bool interpolate, std::vector<float>* cost);

@@ -280,12 +280,13 @@ void TsdfGrid::apply_row(const TsdfObservation& o, int iy, int from, int to) {
     const float d = row_distance_m_[static_cast<std::size_t>(k)];
     const float eta = o.range_m[u] - d;  // NaN without a surface
     const float mu = o.truncation_m[u];
-    const bool near_surface = eta >= -mu && eta < mu;
+    const bool near_surface = eta >= -o.behind_m[u] && eta < mu;
     const bool carved = !near_surface && d >= o.free_from_m[u] && d <= o.free_to_m[u];
     if (!near_surface && !carved) continue;
     const float f = near_surface ? eta / mu : 1.0f;  // equation 2: min(1, |eta| / mu) sgn(eta)
     const float square = d * d > floor2 ? d * d : floor2;
-    const auto w = static_cast<std::int32_t>(weight_unit_ / square + 0.5f);  // equation 4
+    const float taper = o.taper && eta < 0.0f ? 1.0f + eta / o.behind_m[u] : 1.0f;
+    const auto w = static_cast<std::int32_t>(taper * weight_unit_ / square + 0.5f);  // equation 4
     const float product = f * static_cast<float>(w);
     const auto fw = static_cast<std::int32_t>(product + (product < 0.0f ? -0.5f : 0.5f));
     const int ix = sensor_x + from + k;

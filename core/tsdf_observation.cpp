@@ -10,10 +10,17 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 void resize(std::size_t columns, TsdfObservation* out) {
-  for (std::vector<float>* field : {&out->direction_x, &out->direction_y, &out->range_m, &out->truncation_m,
+  for (std::vector<float>* field : {&out->direction_x, &out->direction_y, &out->range_m, &out->truncation_m, &out->behind_m,
                                     &out->free_from_m, &out->free_to_m, &out->clear_from_m, &out->clear_to_m}) {
     field->resize(columns);
   }
+}
+
+void set_truncation(const TruncationConfig& truncation, std::size_t i, TsdfObservation* out) {
+  const float r = out->range_m[i];
+  out->taper = truncation.tapers();
+  out->truncation_m[i] = std::isnan(r) ? 0.0f : truncation.at(r);
+  out->behind_m[i] = std::isnan(r) ? 0.0f : truncation.behind_at(r);
 }
 
 bool answered(const TsdfObservation& o, std::size_t i) {
@@ -69,7 +76,7 @@ void set_clear(const ObservationLimits& limits, TsdfObservation* out) {
 void set_reach(TsdfObservation* out) {
   float reach = 0.0f;
   for (std::size_t i = 0; i < out->columns(); ++i) {
-    if (!std::isnan(out->range_m[i])) reach = std::max(reach, out->range_m[i] + out->truncation_m[i]);
+    if (!std::isnan(out->range_m[i])) reach = std::max(reach, out->range_m[i] + out->behind_m[i]);
     if (out->free_to_m[i] >= out->free_from_m[i]) reach = std::max(reach, out->free_to_m[i]);
   }
   out->reach_m = reach;
@@ -98,7 +105,7 @@ void observation_from(const DepthProfile& profile, const ObservationLimits& limi
     out->direction_y[i] = -right / stretch;
     const float z = profile.z_m[i];
     out->range_m[i] = z >= low && z <= high ? z * stretch : kNaN;  // equation 3: the range along the ray, not z
-    out->truncation_m[i] = std::isnan(out->range_m[i]) ? 0.0f : limits.truncation.at(out->range_m[i]);
+    set_truncation(limits.truncation, i, out);
     const float from = profile.free_from_m[i], to = std::min(profile.free_to_m[i], high);
     const bool free = from >= 0.0f && to > from;
     out->free_from_m[i] = free ? from * stretch : 0.0f;
@@ -124,7 +131,7 @@ void observation_from(const RangeScan& scan, const ObservationLimits& limits, Ts
     out->direction_y[i] = static_cast<float>(std::sin(angle));
     const float r = scan.range_m[i];
     out->range_m[i] = r >= low && r <= high ? r : kNaN;
-    out->truncation_m[i] = std::isnan(out->range_m[i]) ? 0.0f : limits.truncation.at(out->range_m[i]);
+    set_truncation(limits.truncation, i, out);
     out->free_from_m[i] = 0.0f;
     if (std::isinf(r) && r > 0.0f) {
       const float beyond = std::min(high, static_cast<float>(limits.scan_free_beyond_m));

@@ -16,12 +16,23 @@ struct TruncationConfig {
   double base_m = 0.4;
   double per_range_squared = 0.003;
   double limit_m = 2.0;
+  double behind_m = 0.2;
 
   template <class Visitor>
   void visit(Visitor& v) {
     v.number("base_m", base_m, 0.05, 5, "m", "Truncation at range 0.");
     v.number("per_range_squared", per_range_squared, 0, 0.1, "1/m", "Its growth with the range squared.");
     v.number("limit_m", limit_m, 0.05, 10, "m", "Its largest value.");
+    v.number("behind_m", behind_m, 0.05, 10, "m",
+             "Behind a surface the weight falls to nothing over this and the same growth; 10 = the paper's full weight "
+             "over the whole truncation, which pushes thin walls seen from both sides apart.");
+  }
+  bool tapers() const { return behind_m < 10.0; }
+  /// How far behind a surface at this range cells are touched.
+  float behind_at(float range_m) const {
+    const float behind = static_cast<float>(behind_m) + static_cast<float>(per_range_squared) * range_m * range_m;
+    const float mu = at(range_m);
+    return tapers() && behind < mu ? behind : mu;
   }
   float at(float range_m) const {
     const float mu = static_cast<float>(base_m) + static_cast<float>(per_range_squared) * range_m * range_m;
@@ -46,6 +57,8 @@ struct TsdfObservation {
   std::vector<float> direction_x, direction_y;  ///< unit vector of the ray in the sensor's frame
   std::vector<float> range_m;                   ///< NaN: no surface
   std::vector<float> truncation_m;              ///< mu(range)
+  std::vector<float> behind_m;                  ///< cells farther than this behind the surface are not touched
+  bool taper = true;                            ///< the weight falls to nothing over behind_m
   std::vector<float> free_from_m, free_to_m;    ///< carved between these; free_to < free_from: nothing
   /// Between these nothing stands within a margin on either side of the ray.
   std::vector<float> clear_from_m, clear_to_m;

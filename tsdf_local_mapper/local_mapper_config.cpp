@@ -7,8 +7,8 @@ namespace knav {
 LocalMapperConfig::LocalMapperConfig() {
   motion.translation_per_translation = 0.1;
   motion.translation_per_rotation = 0.05;
-  motion.rotation_per_translation = 0.2;
-  motion.rotation_per_rotation = 0.3;
+  motion.rotation_per_translation = 0.25;
+  motion.rotation_per_rotation = 0.35;
   motion.sideways_per_translation = 0.05;
 }
 

@@ -1,0 +1,94 @@
+// What a frame costs: integrate, remove, align, contour. Run with --benchmark_filter=... for one of them.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <vector>
+
+#include "core/contour.h"
+#include "core/random.h"
+#include "core/tsdf_alignment.h"
+#include "core/tsdf_grid.h"
+
+namespace knav {
+namespace {
+
+/// A Kinect profile in a hall: the view's walls at `wall_m`, floor seen free from 1.3 m on.
+TsdfObservation kinect_observation(double wall_m, std::uint32_t sequence) {
+  DepthProfile profile;
+  profile.fx_px = 585.0;
+  profile.cx_px = 319.5;
+  RandomStream random(1, random_stream::kTest, sequence, 0);
+  for (int u = 0; u < 640; ++u) {
+    const double noise_m = 0.0015 * wall_m * wall_m * random.normal();
+    profile.z_m.push_back(static_cast<float>(wall_m + noise_m));
+    profile.free_from_m.push_back(1.3f);
+    profile.free_to_m.push_back(static_cast<float>(wall_m - 0.1));
+    profile.height_class.push_back(HeightClass::kMiddle);
+  }
+  TsdfObservation o;
+  observation_from(profile, ObservationLimits{}, &o);
+  o.sequence = sequence;
+  return o;
+}
+
+TsdfGrid hall(double wall_m) {
+  TsdfGrid grid(TsdfConfig{}, 25.0);
+  std::uint32_t sequence = 0;
+  for (int k = 0; k < 36; ++k) {
+    TsdfObservation o = kinect_observation(wall_m, ++sequence);
+    o.T_map_sensor.yaw_rad = k * kPi / 18;
+    grid.add(o);
+  }
+  return grid;
+}
+
+void prepare_observation(benchmark::State& state) {
+  std::uint32_t sequence = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(kinect_observation(static_cast<double>(state.range(0)), ++sequence));
+}
+BENCHMARK(prepare_observation)->Arg(3)->Arg(18)->Unit(benchmark::kMicrosecond);
+
+void integrate_and_remove(benchmark::State& state) {
+  TsdfGrid grid(TsdfConfig{}, 25.0);
+  std::uint32_t sequence = 0;
+  TsdfObservation o = kinect_observation(static_cast<double>(state.range(0)), 1);
+  for (auto _ : state) {
+    o.sequence = ++sequence;
+    o.T_map_sensor.yaw_rad = 0.1 * sequence;
+    grid.add(o);
+    grid.remove(o);
+  }
+}
+BENCHMARK(integrate_and_remove)->Arg(3)->Arg(10)->Arg(18)->Unit(benchmark::kMicrosecond);
+
+void align(benchmark::State& state) {
+  const TsdfGrid grid = hall(8.0);
+  const auto count = static_cast<std::size_t>(state.range(0));
+  ParticleSet particles;
+  particles.resize(count);
+  RandomStream random(1, random_stream::kTest, 0, 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    particles.set(i, {random.normal(0, 0.1), random.normal(0, 0.1), random.normal(0, 0.05)});
+  }
+  WeightedPoints points;
+  for (int k = 0; k < 120; ++k) {
+    const double right = (k - 59.5) / 110.0;
+    points.add(8.0f, static_cast<float>(-8.0 * right), 1.0f);
+  }
+  std::vector<float> cost;
+  for (auto _ : state) tsdf_alignment_costs(grid, points, particles, 0.6f, &cost);
+  state.counters["ns_per_particle_reading"] =
+      benchmark::Counter(static_cast<double>(state.iterations()) * static_cast<double>(count) * 120e-9,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(align)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
+
+void contour(benchmark::State& state) {
+  const TsdfGrid grid = hall(static_cast<double>(state.range(0)));
+  RangeScan scan;
+  for (auto _ : state) extract_contour(grid, ContourConfig{}, Pose2{}, 0.0f, &scan);
+}
+BENCHMARK(contour)->Arg(3)->Arg(8)->Arg(18)->Unit(benchmark::kMicrosecond);
+
+}  // namespace
+}  // namespace knav
