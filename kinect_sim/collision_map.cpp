@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace knav {
 namespace {
@@ -69,12 +70,14 @@ double CollisionMap::clearance_m(const Point2& point) const {
   return best;
 }
 
-bool CollisionMap::over_stairs(const Point2& point, double wheel_m) const {
-  return std::any_of(world_->stairs.begin(), world_->stairs.end(), [&](const FloorRect& s) {
+double CollisionMap::stairs_distance_m(const Point2& point) const {
+  double best = std::numeric_limits<double>::infinity();
+  for (const FloorRect& s : world_->stairs) {
     const double dx = std::max({s.min_x_m - point.x_m, 0.0, point.x_m - s.max_x_m});
     const double dy = std::max({s.min_y_m - point.y_m, 0.0, point.y_m - s.max_y_m});
-    return std::hypot(dx, dy) < wheel_m;
-  });
+    best = std::min(best, std::hypot(dx, dy));
+  }
+  return best;
 }
 
 }  // namespace knav

@@ -18,8 +18,8 @@ class CollisionMap {
   /// Distance [m] from a point to the nearest solid, doors and timed pieces as last set included; exact up to
   /// 0.75 m, and never more than that.
   double clearance_m(const Point2& point) const;
-  /// True if a wheel of a robot with wheels this far from its centre would be over a stair.
-  bool over_stairs(const Point2& point, double wheel_m) const;
+  /// Distance [m] to the nearest stairs; 0 over them, +Inf if there are none.
+  double stairs_distance_m(const Point2& point) const;
   void set_doors(const std::vector<double>& door_open_rad);
   void set_timed(const std::vector<char>& present);
 

@@ -12,9 +12,12 @@ namespace {
 // The noise field: a torus that each frame reads from another place. White noise under a box of 8 x 11 px, as
 // the device matches blocks, gives after quantisation what the real walls in realdata show along rows
 // (autocorrelation 0.66 at 1 px, 0.29 at 4, -0.07 at 8) and along columns (0.72, 0.42, 0.15).
-constexpr int kFieldWidth = 2048, kFieldHeight = 1024;
+constexpr int kFieldWidth = 1024, kFieldHeight = 512;
 constexpr int kBoxWidth = 8, kBoxHeight = 11;
 constexpr double kFieldUnit = 1.0 / 4096.0;  ///< codes per count
+
+constexpr float kFarthest_m = 40.0f;    ///< nothing comes back from beyond
+constexpr float kShadow_codes = 12.0f;  ///< a pixel whose projector column is this much nearer lies in shadow
 
 /// Sums over a running window on a ring.
 void box_filter(std::vector<float>& line, std::vector<float>& scratch, int window) {
@@ -28,11 +31,10 @@ void box_filter(std::vector<float>& line, std::vector<float>& scratch, int windo
   }
 }
 
-std::vector<std::int16_t> make_field(std::uint64_t seed, std::uint32_t index, int box_width, int box_height,
-                                     double sd) {
+std::vector<std::int16_t> make_field(std::uint64_t seed, int box_width, int box_height, double sd) {
   std::vector<float> field(static_cast<std::size_t>(kFieldWidth) * kFieldHeight), line, scratch;
   for (int y = 0; y < kFieldHeight; ++y) {
-    RandomStream random(seed, random_stream::kSimDepth, index, static_cast<std::uint32_t>(y));
+    RandomStream random(seed, random_stream::kSimDepth, 0, static_cast<std::uint32_t>(y));
     line.resize(kFieldWidth);
     for (float& value : line) value = static_cast<float>(random.normal());
     box_filter(line, scratch, box_width);
@@ -86,14 +88,16 @@ KinectModel::KinectModel(const KinectConfig& config, const PinholeModel& camera,
   const auto width = static_cast<std::size_t>(camera.width_px);
   band_codes_.assign(width, 0.0f);
   codes_.assign(width, 0.0f);
+  reading_.assign(width, 0);
   lit_codes_.assign(2 * width, 0.0f);
   make_offset(device_seed);
   // Rounding to whole codes adds a twelfth to the variance of what was correlated before.
   const double sd = config.quantize
                         ? std::sqrt(std::max(0.0, config.noise_codes * config.noise_codes - 1.0 / 12.0))
                         : config.noise_codes;
-  noise_ = make_field(seed, 0, kBoxWidth, kBoxHeight, sd);
-  texture_ = make_field(seed, 1, 5, 5, 1.0);
+  if (!config.quantize) return;
+  noise_ = make_field(seed, kBoxWidth, kBoxHeight, 1.0);
+  noise_sd_ = static_cast<float>(sd);
 }
 
 void KinectModel::make_offset(std::uint64_t device_seed) {
@@ -163,56 +167,56 @@ void KinectModel::sense_row(int row, const TrueRow& in, std::uint16_t* depth_mm)
   const int width = camera_.width_px;
   const auto fb_codes = static_cast<float>(8.0 * config_.focal_px * config_.baseline_m);
   const auto min_range = static_cast<float>(config_.min_range_m);
+  const float* z_m = in.z_m;
   if (!config_.quantize) {
     for (int u = 0; u < width; ++u) {
-      const float z = in.z_m[u];
+      const float z = z_m[u];
       depth_mm[u] =
           z >= min_range && z < 65.0f ? static_cast<std::uint16_t>(z * 1000.0f + 0.5f) : std::uint16_t{0};
     }
     return;
   }
   float* codes = codes_.data();
-  for (int u = 0; u < width; ++u) codes[u] = fb_codes / in.z_m[u];  // 0 at infinity
+  for (int u = 0; u < width; ++u) codes[u] = fb_codes / z_m[u];  // 0 at infinity
   if (config_.shadow) mark_lit(codes);
 
-  const auto field_row = [](const std::vector<std::int16_t>& field, std::uint32_t row_offset, int v) {
-    return &field[((row_offset + static_cast<std::uint32_t>(v)) % kFieldHeight) * kFieldWidth];
+  const auto field = [&](std::uint32_t column, std::uint32_t first_row) {
+    const std::uint32_t field_row = (first_row + static_cast<std::uint32_t>(row)) % kFieldHeight;
+    return &noise_[field_row * kFieldWidth + column % static_cast<std::uint32_t>(kFieldWidth - width)];
   };
-  const std::int16_t* noise = field_row(noise_, noise_row_, row);
-  const std::int16_t* texture = field_row(texture_, texture_row_, row);
-  const std::uint32_t noise_start = noise_column_ % (kFieldWidth - 640u);
-  const std::uint32_t texture_start = texture_column_ % (kFieldWidth - 640u);
+  const std::int16_t* noise = field(noise_column_, noise_row_);
+  const std::int16_t* texture = field(texture_column_, texture_row_);
   const float* offset = offset_codes_.ptr<float>(row);
+  const float* band = band_codes_.data();
+  const float* signal = in.signal;
   const auto unit = static_cast<float>(kFieldUnit);
+  const float noise_unit = noise_sd_ * unit;
   const auto saturation_codes = static_cast<float>(fb_codes / config_.saturation_m);
   const auto farthest_codes = static_cast<float>(fb_codes / config_.max_range_m);
-  const auto threshold = static_cast<float>(config_.dropout_signal);
-  const bool any_dropout = config_.dropout_signal > 0.0;
+  // Without dropouts any signal is enough.
+  const auto threshold = static_cast<float>(config_.dropout_signal > 0.0 ? config_.dropout_signal : -1.0);
+  std::int32_t* reading = reading_.data();
   for (int u = 0; u < width; ++u) {
-    const float true_codes = codes[u];
-    // Noise grows where the readings saturate: anything may come there.
-    const float far = std::max(0.0f, saturation_codes - true_codes);
+    // Codes below the one of infinity. The noise grows where they saturate: anything may come there.
+    const float far = std::max(0.0f, saturation_codes - codes[u]);
     float code =
-        true_codes - offset[u] - band_codes_[static_cast<std::size_t>(u)] +
-        (1.0f + 2.0f * far) * unit * static_cast<float>(noise[noise_start + static_cast<std::uint32_t>(u)]);
-    // Distances are codes below the one of infinity; whole ones come out of the device.
-    code = static_cast<float>(static_cast<int>(code + 0.5f));
-    code = std::max(code, farthest_codes);
+        codes[u] - offset[u] - band[u] + (1.0f + 2.0f * far) * noise_unit * static_cast<float>(noise[u]);
+    code = std::max(static_cast<float>(static_cast<std::int32_t>(code + 0.5f)), farthest_codes);
     const float mm = 1000.0f * fb_codes / code;
-    const float z = in.z_m[u];
-    const float fall = 1.0f + z * z * 0.01f;
-    const float grain =
-        1.0f + 0.2f * unit * static_cast<float>(texture[texture_start + static_cast<std::uint32_t>(u)]);
-    const bool seen = !any_dropout || in.signal[u] * grain > threshold * fall;
-    const bool valid = z >= min_range && z < 40.0f && seen;
-    depth_mm[u] = valid ? static_cast<std::uint16_t>(static_cast<int>(mm + 0.5f)) : std::uint16_t{0};
+    const float fall = 1.0f + z_m[u] * z_m[u] * 0.01f;
+    const float grain = 1.0f + 0.2f * unit * static_cast<float>(texture[u]);
+    const bool valid =
+        (z_m[u] >= min_range) & (z_m[u] < kFarthest_m) & (signal[u] * grain > threshold * fall);
+    reading[u] = valid ? static_cast<std::int32_t>(mm + 0.5f) : 0;
   }
-  if (!config_.shadow) return;
-  for (int u = 0; u < width; ++u) {
-    const float position = static_cast<float>(u) - codes[u] * 0.125f + static_cast<float>(width) + 0.5f;
-    const auto column = static_cast<std::size_t>(std::max(0, static_cast<int>(position)));
-    if (lit_codes_[column] > codes[u] + 12.0f) depth_mm[u] = 0;
+  if (config_.shadow) {
+    for (int u = 0; u < width; ++u) {
+      const float position = static_cast<float>(u) - codes[u] * 0.125f + static_cast<float>(width) + 0.5f;
+      const int column = std::max(0, static_cast<int>(position));
+      if (lit_codes_[static_cast<std::size_t>(column)] > codes[u] + kShadow_codes) reading[u] = 0;
+    }
   }
+  for (int u = 0; u < width; ++u) depth_mm[u] = static_cast<std::uint16_t>(reading[u]);
 }
 
 }  // namespace knav

@@ -58,8 +58,10 @@ class KinectModel {
   PinholeModel camera_;
   std::uint64_t seed_, device_seed_;
   cv::Mat offset_px_, offset_codes_;
-  std::vector<std::int16_t> noise_, texture_;
+  std::vector<std::int16_t> noise_;  ///< sd 1
+  float noise_sd_ = 0.0f;
   std::vector<float> band_codes_, codes_;
+  std::vector<std::int32_t> reading_;
   std::vector<float> lit_codes_;  ///< nearest disparity [codes] per projector column
   std::uint32_t noise_column_ = 0, noise_row_ = 0, texture_column_ = 0, texture_row_ = 0;
 };

@@ -13,6 +13,7 @@ namespace knav {
 namespace {
 
 constexpr double kSample_m = 0.025;   ///< length that one sample of the true surface stands for
+constexpr double kOffset_m = 0.0119;  ///< so that walls at round coordinates do not lie between two samples
 constexpr double kOutlier_m = 0.3;
 
 std::uint64_t cell_key(const Point2& p, double size_m) {
@@ -107,12 +108,14 @@ std::vector<Point2> visible_surface(const TrueSurfaces& surfaces, const Trajecto
     const Pose2 camera = base * Pose2{config.camera_forward_m, 0, 0};
     const Eigen::Vector3f origin(static_cast<float>(camera.x_m), static_cast<float>(camera.y_m), 1.0f);
     for (int i = 0; i < rays; ++i) {
-      const double angle = camera.yaw_rad + (static_cast<double>(i) / (rays - 1) - 0.5) * config.fov_deg * kPi / 180.0;
-      const Eigen::Vector3f direction(static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), 0.0f);
+      const double angle =
+          camera.yaw_rad + (static_cast<double>(i) / (rays - 1) - 0.5) * config.fov_deg * kPi / 180.0;
+      const Eigen::Vector3f direction(static_cast<float>(std::cos(angle)),
+                                      static_cast<float>(std::sin(angle)), 0.0f);
       const float range = scene.cast(origin, direction, static_cast<float>(config.range_m));
       if (!std::isfinite(range)) continue;
       const Point2 hit{camera.x_m + range * std::cos(angle), camera.y_m + range * std::sin(angle)};
-      Sample& sample = samples[cell_key(hit, kSample_m)];
+      Sample& sample = samples[cell_key({hit.x_m + kOffset_m, hit.y_m + kOffset_m}, kSample_m)];
       sample.sum.x_m += hit.x_m;
       sample.sum.y_m += hit.y_m;
       ++sample.hits;
@@ -128,9 +131,8 @@ std::vector<Point2> visible_surface(const TrueSurfaces& surfaces, const Trajecto
     if (sample.sightings < config.sightings) continue;
     result.push_back({sample.sum.x_m / sample.hits, sample.sum.y_m / sample.hits});
   }
-  std::sort(result.begin(), result.end(), [](const Point2& a, const Point2& b) {
-    return a.x_m != b.x_m ? a.x_m < b.x_m : a.y_m < b.y_m;
-  });
+  std::sort(result.begin(), result.end(),
+            [](const Point2& a, const Point2& b) { return a.x_m != b.x_m ? a.x_m < b.x_m : a.y_m < b.y_m; });
   return result;
 }
 
@@ -142,10 +144,12 @@ std::vector<Point2> zero_contour(const DistanceMap& map) {
   const auto crossing = [&](int ix, int iy, int jx, int jy) {
     const float a = map.at(ix, iy), b = map.at(jx, jy);
     if (!std::isfinite(a) || !std::isfinite(b) || (a < 0.0f) == (b < 0.0f)) return;
-    // A distance cannot change by more than the step between cells; a leap is where two surfaces' inner sides meet.
+    // A distance cannot change by more than the step between cells; a leap is where two surfaces' inner sides
+    // meet.
     if (std::abs(a - b) > 2.0 * g.resolution_m) return;
     const double t = a / (a - b);
-    contour.push_back({g.center_x_m(ix) + t * (jx - ix) * g.resolution_m, g.center_y_m(iy) + t * (jy - iy) * g.resolution_m});
+    contour.push_back({g.center_x_m(ix) + t * (jx - ix) * g.resolution_m,
+                       g.center_y_m(iy) + t * (jy - iy) * g.resolution_m});
   };
   for (int iy = 0; iy < g.height_cells; ++iy) {
     for (int ix = 0; ix < g.width_cells; ++ix) {
@@ -175,8 +179,10 @@ TrueSurfaces::TrueSurfaces(const WorldConfig& world, double low_m, double high_m
   for (std::uint32_t i = 0; i < edges_.size(); ++i) {
     const Edge& e = edges_[i];
     const double reach = kReach_m + 0.36;
-    const int x0 = buckets_.cell_x(std::min(e.a.x_m, e.b.x_m) - reach), x1 = buckets_.cell_x(std::max(e.a.x_m, e.b.x_m) + reach);
-    const int y0 = buckets_.cell_y(std::min(e.a.y_m, e.b.y_m) - reach), y1 = buckets_.cell_y(std::max(e.a.y_m, e.b.y_m) + reach);
+    const int x0 = buckets_.cell_x(std::min(e.a.x_m, e.b.x_m) - reach),
+              x1 = buckets_.cell_x(std::max(e.a.x_m, e.b.x_m) + reach);
+    const int y0 = buckets_.cell_y(std::min(e.a.y_m, e.b.y_m) - reach),
+              y1 = buckets_.cell_y(std::max(e.a.y_m, e.b.y_m) + reach);
     for (int iy = y0; iy <= y1; ++iy) {
       for (int ix = x0; ix <= x1; ++ix) {
         if (!buckets_.contains(ix, iy)) continue;
@@ -233,7 +239,8 @@ MapEvaluation evaluate_map(const DistanceMap& map, const WorldConfig& world, con
   const auto count = static_cast<double>(error_m.size());
   result.rmse_m = std::sqrt(sum2 / count);
   result.outlier_fraction /= count;
-  result.contour_length_m = count * map.geometry.resolution_m * kPi / 4.0;  // crossings a metre, mean over directions
+  result.contour_length_m =
+      count * map.geometry.resolution_m * kPi / 4.0;  // crossings a metre, mean over directions
   std::sort(error_m.begin(), error_m.end());
   result.median_m = error_m[error_m.size() / 2];
   result.percentile_95_m = error_m[error_m.size() * 95 / 100];
@@ -254,7 +261,8 @@ cv::Mat evaluation_picture(const MapEvaluation& evaluation, const WorldConfig& w
   WorldPicture picture(world);
   picture.draw_slice(config.slice_low_m, config.slice_high_m);
   std::vector<Point2> path;
-  for (const StampedPose2& stamped : truth) path.push_back({stamped.T_map_robot.x_m, stamped.T_map_robot.y_m});
+  for (const StampedPose2& stamped : truth)
+    path.push_back({stamped.T_map_robot.x_m, stamped.T_map_robot.y_m});
   picture.draw_path(path, cv::Scalar(80, 180, 80));
   for (const Point2& p : evaluation.missed) picture.draw_point(p, cv::Scalar(0, 0, 255), 2);
   for (const Point2& p : evaluation.contour_world) picture.draw_point(p, cv::Scalar(220, 90, 20), 1);

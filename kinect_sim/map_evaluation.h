@@ -14,23 +14,25 @@ struct MapEvaluationConfig {
   double slice_low_m = 0.05, slice_high_m = 2.0;  ///< heights that count as wall for the sensor
   double range_m = 8.0;                           ///< a wall nearer than this should be in the map
   double fov_deg = 57.0;
-  double match_m = 0.10;                          ///< mapped: the contour lies this near
-  int sightings = 3;                              ///< poses (0.1 m or 0.1 rad apart) that must have seen it
+  double match_m = 0.10;  ///< mapped: the contour lies this near
+  int sightings = 3;      ///< poses (0.1 m or 0.1 rad apart) that must have seen it
   double camera_forward_m = 0.05;
 };
 
 struct MapEvaluation {
   double rmse_m = 0.0, median_m = 0.0, percentile_95_m = 0.0;
-  double outlier_fraction = 0.0;     ///< contour farther than 0.3 m from any true surface
+  double outlier_fraction = 0.0;  ///< contour farther than 0.3 m from any true surface
   double completeness = 0.0;
   double contour_length_m = 0.0, visible_length_m = 0.0;
-  Pose2 T_world_map;                 ///< after alignment
-  Pose2 T_start_map;                 ///< what the alignment changed
+  Pose2 T_world_map;  ///< after alignment
+  Pose2 T_start_map;  ///< what the alignment changed
   std::vector<Point2> contour_world;
-  std::vector<Point2> visible, missed;  ///< true surface that was seen, and the part of it that has no contour
+  std::vector<Point2> visible,
+      missed;  ///< true surface that was seen, and the part of it that has no contour
 };
 
-/// The zero crossings of a signed distance map between neighbouring cells, to a fraction of a cell; map frame.
+/// The zero crossings of a signed distance map between neighbouring cells, to a fraction of a cell; map
+/// frame.
 std::vector<Point2> zero_contour(const DistanceMap& map);
 
 /// Surfaces of a world in a slice of heights.

@@ -13,8 +13,10 @@
 namespace {
 
 constexpr char kHelp[] =
-    "A picture of a world: its plan (default), or what the simulated Kinect sees from a pose (--view x y yaw_deg).\n"
-    "Plan: walls dark, furniture brown, table tops light, glass blue, stairs violet, low things red, people orange.";
+    "A picture of a world: its plan (default), or what the simulated Kinect sees from a pose (--view x y "
+    "yaw_deg).\n"
+    "Plan: walls dark, furniture brown, table tops light, glass blue, stairs violet, low things red, people "
+    "orange.";
 
 }  // namespace
 
@@ -29,14 +31,16 @@ int main(int argc, char** argv) {
   app.add_flag("--top-view", top_view, "The plan (default)");
   app.add_option("--script", script, "Draw this tour's path into the plan");
   app.add_option("--scale", scale, "Pixels per metre of the plan")->check(CLI::Range(1.0, 500.0));
-  CLI::Option* view_option = app.add_option("--view", view, "x y yaw_deg: depth image from there")->expected(3);
+  CLI::Option* view_option =
+      app.add_option("--view", view, "x y yaw_deg: depth image from there")->expected(3);
   app.add_option("--sensor", sensor, "ideal | calibrated | default | harsh")
       ->check(CLI::IsMember(knav::KinectConfig::preset_names()));
   app.add_option("--far", far_m, "Depth [m] at the end of the colour scale");
   CLI11_PARSE(app, argc, argv);
 
   return knav::run_program("render_world", [&] {
-    if (top_view && *view_option) throw knav::UserError("--top-view and --view exclude each other; give one.");
+    if (top_view && *view_option)
+      throw knav::UserError("--top-view and --view exclude each other; give one.");
     const knav::WorldConfig world = knav::load_world(world_path);
     cv::Mat image;
     if (*view_option) {

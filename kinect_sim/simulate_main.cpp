@@ -17,14 +17,18 @@
 namespace {
 
 constexpr char kHelp[] =
-    "Drives a script through a simulated building and records what the robot's topics say: odom, tf, tf_static,\n"
-    "ground_truth, mark_place and, if asked, camera/depth/image_raw, camera/depth/camera_info, lidar_scan, range.\n"
+    "Drives a script through a simulated building and records what the robot's topics say: odom, tf, "
+    "tf_static,\n"
+    "ground_truth, mark_place and, if asked, camera/depth/image_raw, camera/depth/camera_info, lidar_scan, "
+    "range.\n"
     "No ROS master is needed. The same world, script, options and seed give the same recording.\n"
-    "World and script files: docs/simulator.md. --json: {duration_s, distance_m, depth_frames, marks, collisions,\n"
+    "World and script files: docs/simulator.md. --json: {duration_s, distance_m, depth_frames, marks, "
+    "collisions,\n"
     "walker_contacts, odometry_error_m, odometry_error_deg}; the odometry's errors are those at the end.";
 
 /// A preset named on the command line, if any.
-void choose(const char* option, const std::string& given, const std::vector<std::string>& names, std::string* value) {
+void choose(const char* option, const std::string& given, const std::vector<std::string>& names,
+            std::string* value) {
   if (given.empty()) return;
   if (std::find(names.begin(), names.end(), given) == names.end()) {
     throw knav::UserError(fmt::format("{}: '{}' must be one of {}.", option, given, fmt::join(names, " | ")));
@@ -63,15 +67,18 @@ int main(int argc, char** argv) {
   app.add_option("--sensor", sensor, "ideal | calibrated | default | harsh");
   app.add_option("--odometry", odometry_preset, "perfect | default | bad");
   app.add_option("--depth", depth, "Raw depth to record: none, all, or its first SECONDS (18 MB a second)");
-  app.add_option("--compression", compression, "none | lz4 | bz2")->check(CLI::IsMember({"none", "lz4", "bz2"}));
+  app.add_option("--compression", compression, "none | lz4 | bz2")
+      ->check(CLI::IsMember({"none", "lz4", "bz2"}));
   app.add_flag("--lidar", options.lidar, "Record lidar_scan too (180 deg, 361 rays, 10 Hz)");
-  app.add_flag("--range", options.range, "Record range too: the true distance straight ahead, for calibration");
+  app.add_flag("--range", options.range,
+               "Record range too: the true distance straight ahead, for calibration");
   app.add_option("--json", json, "Write figures as JSON (- for standard output)");
   CLI11_PARSE(app, argc, argv);
 
   return knav::run_program("simulate", [&] {
     options.depth_s = depth_seconds(depth);
-    knav::SimulatorConfig config = knav::read_config_section<knav::SimulatorNodeConfig>(config_file, "simulator");
+    knav::SimulatorConfig config =
+        knav::read_config_section<knav::SimulatorNodeConfig>(config_file, "simulator");
     if (seed >= 0) config.seed = seed;
     if (device_seed >= 0) config.device_seed = device_seed;
     choose("--sensor", sensor, knav::KinectConfig::preset_names(), &config.sensor);
@@ -104,9 +111,10 @@ int main(int argc, char** argv) {
                               {"odometry_error_deg", error.yaw_rad * 180.0 / knav::kPi}};
     knav::write_json(json, figures.dump(2));
     if (json != "-") {
-      fmt::print("{:.1f} m in {:.1f} s, {} depth frames, {} marks, {} collisions; odometry ends {:.2f} m off.\n",
-                 result.distance_m, result.duration_s, result.depth_frames, result.marks.size(),
-                 result.contacts.collisions, std::hypot(error.x_m, error.y_m));
+      fmt::print(
+          "{:.1f} m in {:.1f} s, {} depth frames, {} marks, {} collisions; odometry ends {:.2f} m off.\n",
+          result.distance_m, result.duration_s, result.depth_frames, result.marks.size(),
+          result.contacts.collisions, std::hypot(error.x_m, error.y_m));
     }
   });
 }

@@ -137,12 +137,13 @@ void Simulator::move_doors() {
 
 double Simulator::gap_m(const Pose2& pose) const {
   const Point2 at{pose.x_m, pose.y_m};
-  if (collision_map_.over_stairs(at, 0.6 * config_.robot.radius_m)) return -config_.robot.radius_m;
   double clearance = collision_map_.clearance_m(at);
   for (const PersonState& person : dynamic_.people) {
     clearance = std::min(clearance, distance_m(person.T_world_person, pose) - person.radius_m);
   }
-  return clearance - config_.robot.radius_m;
+  // The wheels stand at six tenths of the radius; the rim may hang over a stair.
+  const double over_stairs_m = collision_map_.stairs_distance_m(at) - 0.6 * config_.robot.radius_m;
+  return std::min(clearance - config_.robot.radius_m, over_stairs_m);
 }
 
 void Simulator::step() {

@@ -30,7 +30,8 @@ struct SimulatorNodeConfig : SimulatorConfig {
              "Height of the perfect scan's plane.");
   }
   std::vector<std::string> validate() const {
-    return SimulatorConfig::validate();  // 'world' is asked for where it is needed: programs take it as an argument
+    return SimulatorConfig::validate();  // 'world' is asked for where it is needed: programs take it as an
+                                         // argument
   }
 };
 

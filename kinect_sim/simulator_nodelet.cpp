@@ -49,7 +49,8 @@ class SimulatorNodelet : public NodeletBase {
   void start() override {
     config_ = read_parameters<SimulatorNodeConfig>(getPrivateNodeHandle());
     if (config_.world.empty()) {
-      throw UserError(getPrivateNodeHandle().getNamespace() + ": 'world' is missing; give the path of a world file.");
+      throw UserError(getPrivateNodeHandle().getNamespace() +
+                      ": 'world' is missing; give the path of a world file.");
     }
     simulator_ = std::make_unique<Simulator>(load_world(config_.world), config_);
     ros::NodeHandle& handle = getNodeHandle();

@@ -22,7 +22,8 @@ class TourDriverNodelet : public NodeletBase {
   void start() override {
     config_ = read_parameters<TourDriverConfig>(getPrivateNodeHandle());
     if (config_.script.empty()) {
-      throw UserError(getPrivateNodeHandle().getNamespace() + ": 'script' is missing; give the path of a tour script.");
+      throw UserError(getPrivateNodeHandle().getNamespace() +
+                      ": 'script' is missing; give the path of a tour script.");
     }
     driver_ = std::make_unique<TourDriver>(load_tour(config_.script));
     ros::NodeHandle& handle = getNodeHandle();

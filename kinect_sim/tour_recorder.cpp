@@ -88,8 +88,8 @@ TourResult run_tour(Simulator& simulator, const TourScript& script, const Record
   Progress progress("simulate");
   FrameRequest request;
   const double start_s = simulator.stamp_s();
-  const auto every = static_cast<int>(
-      std::max(1L, std::lround(1.0 / (options.odom_rate_hz * simulator.config().step_s))));
+  const auto every =
+      static_cast<int>(std::max(1L, std::lround(1.0 / (options.odom_rate_hz * simulator.config().step_s))));
   while (true) {
     const TourDriver::Command command = driver.step(simulator.stamp_s(), simulator.T_world_base());
     recorder.odometry();
@@ -102,8 +102,9 @@ TourResult run_tour(Simulator& simulator, const TourScript& script, const Record
     }
     if (command.stuck) {
       const Pose2& at = simulator.T_world_base();
-      throw UserError(fmt::format("{}: the robot makes no headway at [{:.2f}, {:.2f}] in {}; change the script there.",
-                                  script.file, at.x_m, at.y_m, simulator.world().file));
+      throw UserError(
+          fmt::format("{}: the robot makes no headway at [{:.2f}, {:.2f}] in {}; change the script there.",
+                      script.file, at.x_m, at.y_m, simulator.world().file));
     }
     simulator.set_command(command.v_mps, command.w_radps);
     for (int i = 0; i < every; ++i) {

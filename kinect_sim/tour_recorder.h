@@ -16,9 +16,9 @@ namespace knav {
 
 /// What goes into the recording of a tour.
 struct RecordingOptions {
-  double depth_s = 0.0;    ///< raw depth for the first so many seconds; +Inf = all, 0 = none
-  bool lidar = false;      ///< lidar_scan at 10 Hz
-  bool range = false;      ///< range: the distance straight ahead of the camera, at 10 Hz
+  double depth_s = 0.0;  ///< raw depth for the first so many seconds; +Inf = all, 0 = none
+  bool lidar = false;    ///< lidar_scan at 10 Hz
+  bool range = false;    ///< range: the distance straight ahead of the camera, at 10 Hz
   double odom_rate_hz = 50.0;
 };
 
@@ -30,8 +30,8 @@ struct TourResult {
   Trajectory truth, odometry;  ///< T_world_base, T_odom_base at the odometry's rate
 };
 
-/// Drives a script through a world in lock-step, with a progress line, and writes what happens to a bag (null: to
-/// none). UserError if the robot gets stuck.
+/// Drives a script through a world in lock-step, with a progress line, and writes what happens to a bag
+/// (null: to none). UserError if the robot gets stuck.
 TourResult run_tour(Simulator& simulator, const TourScript& script, const RecordingOptions& options,
                     rosbag::Bag* bag);
 

@@ -5,7 +5,8 @@
 
 namespace knav {
 
-WorldPicture::WorldPicture(const WorldConfig& world, double pixels_per_m) : world_(world), scale_(pixels_per_m) {
+WorldPicture::WorldPicture(const WorldConfig& world, double pixels_per_m)
+    : world_(world), scale_(pixels_per_m) {
   const FloorRect& b = world.bounds;
   const int width = static_cast<int>(std::ceil((b.max_x_m - b.min_x_m) * scale_)) + 1;
   const int height = static_cast<int>(std::ceil((b.max_y_m - b.min_y_m) * scale_)) + 1;
@@ -25,10 +26,12 @@ void WorldPicture::fill(const Solid& solid, const cv::Scalar& bgr) {
 
 void WorldPicture::draw_world() {
   for (const FloorRect& s : world_.stairs) {
-    cv::rectangle(image_, pixel({s.min_x_m, s.min_y_m}), pixel({s.max_x_m, s.max_y_m}), cv::Scalar(200, 160, 220), -1);
+    cv::rectangle(image_, pixel({s.min_x_m, s.min_y_m}), pixel({s.max_x_m, s.max_y_m}),
+                  cv::Scalar(200, 160, 220), -1);
   }
   for (const FloorRect& s : world_.sun_patches) {
-    cv::rectangle(image_, pixel({s.min_x_m, s.min_y_m}), pixel({s.max_x_m, s.max_y_m}), cv::Scalar(150, 240, 255), -1);
+    cv::rectangle(image_, pixel({s.min_x_m, s.min_y_m}), pixel({s.max_x_m, s.max_y_m}),
+                  cv::Scalar(150, 240, 255), -1);
   }
   for (const Solid& solid : solids_at(world_, 0.0)) {
     if (solid.top_m <= 0.0) continue;
@@ -40,7 +43,7 @@ void WorldPicture::draw_world() {
     } else if (solid.bottom_m > 0.3) {
       colour = cv::Scalar(150, 190, 220);  // table tops
     } else if (solid.top_m < 0.25) {
-      colour = cv::Scalar(80, 80, 230);    // low things
+      colour = cv::Scalar(80, 80, 230);  // low things
     } else if (solid.material != Material::kWall) {
       colour = cv::Scalar(80, 130, 170);
     }
