@@ -52,7 +52,8 @@ struct WeightedPoints {
 /// For each particle, the weighted mean cost in [0, 1] of the readings seen from its pose (equation 7, normalised).
 /// The same bytes on machines with and without AVX2.
 /// @param interpolate bilinear between cell centres; otherwise the nearest cell
+/// @param vectors     false: plain code even where there is AVX2, for tests
 void alignment_costs(const CostField& field, const WeightedPoints& points_robot, const ParticleSet& particles,
-                     bool interpolate, std::vector<float>* cost);
+                     bool interpolate, std::vector<float>* cost, bool vectors = true);
 
 }  // namespace knav

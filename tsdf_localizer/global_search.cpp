@@ -90,7 +90,7 @@ std::size_t GlobalSearch::try_places(const MapFields& fields) {
     const auto heading = static_cast<double>((next_pose_ + k) % headings_);
     poses_.set(k, {p.x_m, p.y_m, normalize_angle_rad(2.0 * kPi * heading / static_cast<double>(headings_))});
   }
-  alignment_costs(fields.coarse, coarse_rays_.points, poses_, false, &cost_);
+  alignment_costs(fields.coarse, coarse_rays_.points, poses_, true, &cost_);
   const GridGeometry& grid = fields.map.geometry;
   for (std::size_t k = 0; k < count; ++k) {
     const auto bx = static_cast<std::size_t>((poses_.x_m[k] - grid.origin_x_m) / kBin_m);

@@ -10,7 +10,7 @@
 namespace knav {
 namespace {
 
-constexpr double kCoarseCell_m = 0.1;
+constexpr double kCoarseCell_m = 0.2;
 
 double price(float distance_m, double truncation_m, double unknown_cost) {
   return std::isfinite(distance_m) ? std::min(1.0, std::fabs(distance_m) / truncation_m) : unknown_cost;

@@ -14,7 +14,7 @@ namespace knav {
 struct MapFields {
   DistanceMap map;
   CostField fine;    ///< |distance| / truncation at the map's own resolution, for the filter
-  CostField coarse;  ///< in cells of about 0.1 m and with a wider truncation, small enough for the cache:
+  CostField coarse;  ///< in cells of about 0.2 m and with a wider truncation, small enough for the cache:
                      ///< first search
   std::vector<Point2> search_positions;  ///< free places on the search's grid
 };

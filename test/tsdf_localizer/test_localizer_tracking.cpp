@@ -16,7 +16,7 @@ using test::Building;
 using test::ScanModel;
 using V = LocalizationVerdict;
 
-constexpr double kRate_hz = 15.0;
+constexpr double kRate_hz = 8.0;
 const std::vector<Point2> kTour = {{3.5, 3.0},  {3.5, 8.0},  {10.5, 8.0}, {10.5, 4.5},  {12.5, 3.8},
                                    {10.5, 5.0}, {10.5, 8.0}, {19.5, 8.0}, {19.5, 5.0},  {21.0, 2.5},
                                    {19.5, 6.0}, {19.5, 8.0}, {17.5, 8.0}, {17.5, 10.5}, {20.0, 11.0}};
@@ -24,7 +24,7 @@ const std::vector<Point2> kTour = {{3.5, 3.0},  {3.5, 8.0},  {10.5, 8.0}, {10.5,
 /// What scan_360 looks like: 57 deg fresh and as noisy as a Kinect, the rest from the local map, with holes.
 ScanModel kinect() {
   ScanModel model;
-  model.rays = 1440;
+  model.rays = 720;
   model.noise_m = 0.01;
   model.noise_per_range_squared = 0.002;
   model.fresh_fov_rad = 57.0 * kPi / 180.0;

@@ -1,0 +1,72 @@
+// The budget of a scan: 2,000 particles x 3,600 rays in 6 ms on one core (docs/localization.md).
+#include <benchmark/benchmark.h>
+
+#include "synthetic_building.h"
+#include "tsdf_localizer/belief.h"
+#include "tsdf_localizer/global_search.h"
+#include "tsdf_localizer/localizer.h"
+#include "tsdf_localizer/pose_check.h"
+
+namespace knav {
+namespace {
+
+const Pose2 kPose{10.5, 5.0, 2.0};
+
+void BM_AlignmentCosts(benchmark::State& state) {
+  const test::Building office = test::office();
+  const MapFields fields = make_map_fields(office.distance_map(), {}, {});
+  LocalizerConfig config;
+  config.laser_max_beams = static_cast<int>(state.range(1));
+  config.max_particles = static_cast<int>(state.range(0));
+  ScanRays rays;
+  select_rays(make_scan(office, kPose, test::ScanModel(), 0.0), Pose2(), config, 0, &rays);
+  Belief belief(config);
+  belief.spread_around(kPose, Eigen::Vector3d(0.01, 0.01, 0.003).asDiagonal());
+  std::vector<float> cost;
+  for (auto _ : state) alignment_costs(fields.fine, rays.points, belief.particles(), true, &cost);
+  state.counters["ns_per_reading"] =
+      benchmark::Counter(static_cast<double>(state.range(0) * state.range(1)) * 1e-9,
+                         benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(BM_AlignmentCosts)->Args({300, 720})->Args({2000, 3600})->Unit(benchmark::kMillisecond);
+
+void BM_CheckPose(benchmark::State& state) {
+  const test::Building office = test::office();
+  const LocalizerConfig config;
+  const DistanceMap map = office.distance_map();
+  ScanRays rays;
+  select_rays(make_scan(office, kPose, test::ScanModel(), 0.0), Pose2(), config, 0, &rays);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(check_pose(map, rays, kPose, config.measurement, config.health));
+}
+BENCHMARK(BM_CheckPose)->Unit(benchmark::kMicrosecond);
+
+void BM_Update(benchmark::State& state) {
+  const test::Building office = test::office();
+  Localizer localizer{LocalizerConfig()};
+  localizer.set_map(office.distance_map());
+  localizer.initialize(kPose, Eigen::Vector3d(0.01, 0.01, 0.003).asDiagonal());
+  RangeScan scan = make_scan(office, kPose, test::ScanModel(), 0.0);
+  for (auto _ : state) {
+    scan.stamp_s += 0.3;  // each scan is weighed
+    localizer.update(scan, Pose2(), kPose, 1);
+  }
+}
+BENCHMARK(BM_Update)->Unit(benchmark::kMillisecond);
+
+void BM_SearchStep(benchmark::State& state) {
+  const test::Building office = test::office();
+  const LocalizerConfig config;
+  const MapFields fields = make_map_fields(office.distance_map(), config.measurement, config.global_search);
+  ScanRays rays;
+  select_rays(make_scan(office, kPose, test::ScanModel(), 0.0), Pose2(), config, 0, &rays);
+  GlobalSearch search(config.global_search, config.measurement, config.health);
+  for (auto _ : state) {
+    if (!search.running()) search.start(fields, rays, {});
+    search.step(fields);
+  }
+}
+BENCHMARK(BM_SearchStep)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace knav
