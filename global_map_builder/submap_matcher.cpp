@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -14,7 +15,9 @@ constexpr double kPointSpacing_m = 0.1;  // as Submap samples its contour
 constexpr float kCoarseReach_m = 0.6f;   // beyond this a point scores nothing
 constexpr double kCoarseStep_m = 0.2;
 constexpr double kFineReach_m = 0.3;
+constexpr double kWaviness = 0.015;      // mean square of a contour's slope error
 constexpr double kInlier_m = 0.15;
+constexpr double kMinFacing = 0.7;  // cosine between two surfaces' normals
 constexpr std::size_t kCoarsePoints = 120;
 constexpr std::size_t kPeaks = 8;
 
@@ -83,6 +86,7 @@ std::vector<Candidate> search(const MatchConfig& config, const Submap& from, con
 struct Fit {
   Pose2 pose;
   Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();  ///< of (x, y, yaw), per metre squared of residual
+  double weight = 0.0;                                ///< of all points
   double score = 0.0;
 };
 
@@ -102,9 +106,10 @@ Fit refine(const Submap& from, const Submap& to, const Pose2& start) {
       if (!from.interpolate(fit.pose.x_m + rx, fit.pose.y_m + ry, &d, &gradient)) continue;
       if (std::fabs(d) >= kFineReach_m || gradient.norm() < 0.3) continue;
       const double facing = (c * p.normal_x - s * p.normal_y) * gradient.x() + (s * p.normal_x + c * p.normal_y) * gradient.y();
-      if (facing <= 0.0) continue;
+      // Past the end of the other's contour the distance pulls along the wall, which says nothing.
+      if (facing < kMinFacing * gradient.norm()) continue;
       const double q = 1.0 - d * d / (kFineReach_m * kFineReach_m);
-      const double w = q * q * std::min(1.0, facing / gradient.norm());
+      const double w = q * q;
       const Eigen::Vector3d J(gradient.x(), gradient.y(), -ry * gradient.x() + rx * gradient.y());
       H += w * J * J.transpose();
       g += w * d * J;
@@ -114,6 +119,7 @@ Fit refine(const Submap& from, const Submap& to, const Pose2& start) {
     fit.score = score / static_cast<double>(std::max<std::size_t>(1, to.points().size()));
     // A little damping holds directions that nothing constrains.
     const Eigen::Matrix3d damped = H + Eigen::Vector3d(0.5, 0.5, 2.0).asDiagonal().toDenseMatrix();
+    fit.weight = score;
     const Eigen::Vector3d step = damped.ldlt().solve(-g);
     if (!step.allFinite()) break;
     const double scale = std::min(1.0, 0.3 / std::max(1e-9, step.head<2>().norm()));
@@ -161,7 +167,15 @@ Eigen::Matrix3d information_of(const Fit& fit) {
   // 0.3 deg, and a direction left open is known to 1 m.
   const double per_point = 1.0 / (3.0 * 0.05 * 0.05);
   const Eigen::Matrix3d weak = Eigen::Vector3d(1.0, 1.0, 30.0).asDiagonal();
-  Eigen::Matrix3d covariance = (fit.hessian * per_point + weak).inverse();
+  // A straight wall's contour waves by a few degrees, which looks like a hold along the wall: take that out.
+  Eigen::Matrix3d hessian = fit.hessian;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(hessian.topLeftCorner<2, 2>());
+  const Eigen::Vector2d share = ((axes.eigenvalues().array() - kWaviness * fit.weight).max(0.0) /
+                                 axes.eigenvalues().array().max(1e-9)).sqrt();
+  Eigen::Matrix3d shrink = Eigen::Matrix3d::Identity();
+  shrink.topLeftCorner<2, 2>() = axes.eigenvectors() * share.asDiagonal() * axes.eigenvectors().transpose();
+  hessian = shrink * hessian * shrink;
+  Eigen::Matrix3d covariance = (hessian * per_point + weak).inverse();
   covariance += Eigen::Vector3d(4e-4, 4e-4, 2.7e-5).asDiagonal().toDenseMatrix();
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   const double c = std::cos(fit.pose.yaw_rad), s = std::sin(fit.pose.yaw_rad);
