@@ -36,7 +36,7 @@ struct Options {
 
 const char* const kHelp =
     R"(SOURCE is a folder with distances.csv (lines `file,distance_m`; PNG, 16 bit, mm, 0 invalid) or a bag with depth
-images and a sensor_msgs/Range topic. Distances: from the camera to the wall along the optical axis, 0.5 to 4 m in steps
+images and a sensor_msgs/Range topic, of which the frames count that were taken standing still. Distances: from the camera to the wall along the optical axis, 0.5 to 4 m in steps
 of 5-15 %, several frames at each.
 The JSON holds device, tile_px, filled_tiles (count), inverse_depth_scale, and the lists training and validation, each
 entry with distance_m, frames (count) and, relative to the distance, mean_bias_before, mean_bias_after,
@@ -154,18 +154,18 @@ class Loader {
     const BagReader bag(path);
     bag.require_topic(options_.depth_topic);
     bag.require_topic(options_.range_topic);
+    const std::vector<RangeReading> readings = read_ranges(bag);
     Progress progress(stage);
-    double range_m = 0.0, range_s = -1e9;
     int used = 0;
-    bag.for_each({options_.depth_topic, options_.info_topic, options_.range_topic},
+    bag.for_each({options_.depth_topic, options_.info_topic},
                  [&](const rosbag::MessageInstance& message, double done) {
-                   if (const auto range = message.instantiate<sensor_msgs::Range>()) {
-                     range_m = range->range + options_.range_offset_m;
-                     range_s = std::isfinite(range->range) ? message.getTime().toSec() : -1e9;
-                   } else if (const auto info = message.instantiate<sensor_msgs::CameraInfo>()) {
+                   if (const auto info = message.instantiate<sensor_msgs::CameraInfo>()) {
                      if (options_.camera_info.empty()) camera_ = raw_camera_from(*info);
-                   } else if (const auto image = message.instantiate<sensor_msgs::Image>()) {
-                     if (message.getTime().toSec() - range_s > 0.5) return;  // no distance for this frame
+                   } else {
+                     double range_m = 0.0;
+                     if (!stands_still(readings, message.getTime().toSec(), &range_m)) return;
+                     const auto image = message.instantiate<sensor_msgs::Image>();
+                     if (!image) throw UserError(path + ": topic '" + options_.depth_topic + "' holds no images.");
                      cv::Mat view;
                      std::string fault;
                      if (!view_depth(*image, &view, &fault)) throw UserError(path + ": " + fault);
@@ -173,8 +173,49 @@ class Loader {
                      progress.update(done, fmt::format("{} frames", ++used));
                    }
                  });
-    if (used == 0) throw UserError(path + ": no depth image has a range reading within 0.5 s before it.");
+    if (used == 0) {
+      throw UserError(fmt::format(
+          "{}: no depth image was taken with the robot standing still (a steady '{}' for {} s before and after).", path,
+          options_.range_topic, kStillFor_s));
+    }
   }
+
+  struct RangeReading {
+    double stamp_s, range_m;
+  };
+
+  std::vector<RangeReading> read_ranges(const BagReader& bag) const {
+    std::vector<RangeReading> readings;
+    bag.for_each({options_.range_topic}, [&](const rosbag::MessageInstance& message, double) {
+      const auto range = message.instantiate<sensor_msgs::Range>();
+      if (!range) throw UserError(bag.path() + ": topic '" + options_.range_topic + "' holds no sensor_msgs/Range.");
+      readings.push_back({message.getTime().toSec(), range->range + options_.range_offset_m});
+    });
+    return readings;
+  }
+
+  /// Frames taken while the robot drives or turns to its next distance show no wall squarely: only those count round
+  /// which the range finder is steady, and their distance is its mean.
+  static bool stands_still(const std::vector<RangeReading>& readings, double stamp_s, double* range_m) {
+    auto reading = std::lower_bound(readings.begin(), readings.end(), stamp_s - kStillFor_s,
+                                    [](const RangeReading& r, double s) { return r.stamp_s < s; });
+    double sum = 0.0, low = 1e9, high = -1e9;
+    int before = 0, after = 0;
+    for (; reading != readings.end() && reading->stamp_s <= stamp_s + kStillFor_s; ++reading) {
+      if (!std::isfinite(reading->range_m)) return false;
+      sum += reading->range_m;
+      low = std::min(low, reading->range_m);
+      high = std::max(high, reading->range_m);
+      ++(reading->stamp_s <= stamp_s ? before : after);
+    }
+    if (before < 2 || after < 2 || high - low > kSteadyWithin_m) return false;
+    *range_m = sum / (before + after);
+    return *range_m <= kFarthestWall_m;
+  }
+
+  static constexpr double kStillFor_s = 0.4;
+  static constexpr double kSteadyWithin_m = 0.015;  // five times a range finder's 2 mm, and a little
+  static constexpr double kFarthestWall_m = 5.0;    // the paper's 4 m, and a little
 
   const Options& options_;
   DepthCorrector corrector_;

@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "kinect_calib/depth_corrector.h"
@@ -47,6 +48,16 @@ void DepthCalibrator::add_frame(const cv::Mat& depth_m, const PinholeModel& came
                                 depth_m.rows, camera_.width_px, camera_.height_px));
   }
   depth_m.copyTo(frame_);
+  // The floor before the wall, or what stands beside it, is no wall: its tile learns from other distances.
+  const double gate = config_.wall_gate + config_.wall_gate_per_m * distance_m;
+  const auto nearest_m = static_cast<float>(distance_m * (1.0 - gate));
+  const auto farthest_m = static_cast<float>(distance_m * (1.0 + gate));
+  for (int v = 0; v < frame_.rows; ++v) {
+    float* row = frame_.ptr<float>(v);
+    for (int u = 0; u < frame_.cols; ++u) {
+      if (!(row[u] >= nearest_m && row[u] <= farthest_m)) row[u] = std::numeric_limits<float>::quiet_NaN();
+    }
+  }
   if (config_.deband) debander_.remove_bands(&frame_);
 
   const double same_m = std::max(0.01, 0.005 * distance_m);

@@ -15,6 +15,8 @@ struct DepthCalibratorConfig {
   bool deband = true;
   bool fit_wall_tilt = true;  ///< the robot may stand a degree off square
   double range_finder_sd_m = 0.002;
+  /// Only readings within this share of the distance, growing with it as the sensor's error does, are the wall's.
+  double wall_gate = 0.03, wall_gate_per_m = 0.02;
   double sensor_sd_per_m = 3e-4;  ///< of a tile's mean in inverse depth, once noise is averaged away
 };
 
