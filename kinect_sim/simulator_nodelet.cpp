@@ -4,6 +4,7 @@
 #include <geometry_msgs/Twist.h>
 #include <rosgraph_msgs/Clock.h>
 #include <std_msgs/Bool.h>
+#include <std_msgs/String.h>
 #include <std_msgs/UInt32.h>
 #include <std_srvs/Empty.h>
 #include <tf2_msgs/TFMessage.h>
@@ -65,6 +66,7 @@ class SimulatorNodelet : public NodeletBase {
     walker_contacts_ = handle.advertise<std_msgs::UInt32>("walker_contacts", 5, true);
     bumper_ = handle.advertise<std_msgs::Bool>("bumper", 5, true);
     diagnostics_ = handle.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 5);
+    statistics_ = getPrivateNodeHandle().advertise<std_msgs::String>("statistics", 5, true);
     command_ = handle.subscribe<geometry_msgs::Twist>("cmd_vel", 5, &SimulatorNodelet::on_command, this);
     set_pose_ =
         handle.subscribe<geometry_msgs::PoseStamped>("set_pose", 5, &SimulatorNodelet::on_set_pose, this);
@@ -254,6 +256,12 @@ class SimulatorNodelet : public NodeletBase {
     add("distance_driven_m", fmt::format("{:.2f}", simulator_->distance_driven_m()));
     array.status.push_back(status);
     diagnostics_.publish(array);
+    std_msgs::String statistics;
+    for (const auto& pair : status.values) {
+      statistics.data += (statistics.data.empty() ? "{\"" : ", \"") + pair.key + "\": " + pair.value;
+    }
+    statistics.data += "}";
+    statistics_.publish(statistics);
     window_wall_ = now;
     window_s_ = stamp_s;
   }
@@ -263,7 +271,7 @@ class SimulatorNodelet : public NodeletBase {
   std::unique_ptr<FramePublisher> frames_;
   std::unique_ptr<StampWaiter> waiter_;
   ros::Publisher clock_, odometry_, truth_, tf_, tf_static_, people_, collisions_, walker_contacts_, bumper_,
-      diagnostics_;
+      diagnostics_, statistics_;
   ros::Subscriber command_, set_pose_;
   ros::ServiceServer reset_;
   bool lockstep_ = false;
