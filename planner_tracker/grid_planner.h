@@ -23,8 +23,9 @@ struct PlanResult {
 
 /// Shortest clearance-aware paths: A* on every second cell, 16 neighbours, bucket queue, then pulled straight where
 /// that is not dearer. The straight distance is its only bound: bounds prepared from the map (landmarks) would be
-/// blind to doors that opened since, and 3 ms for 27 m across a hospital need none. Where every second cell finds nothing, every cell is searched. A cell is driven on only if the
-/// whole footprint disc, hard clearance included, lies over free cells.
+/// blind to doors that opened since, and 3 ms for 27 m across a hospital need none. Where every second cell finds
+/// nothing, every cell is searched. A cell is driven on only if the whole footprint disc, hard clearance included,
+/// lies over free cells.
 class GridPlanner {
  public:
   explicit GridPlanner(const PlannerTrackerConfig& config);
