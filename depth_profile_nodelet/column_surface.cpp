@@ -11,17 +11,24 @@ namespace {
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr int kKept = 8;
+constexpr int kKept = 8;  // smallest readings remembered per column
+constexpr int kRounds = 4;
+// Near the camera noise is millimetres, but surfaces slant and a tilted camera's levelled distance has more
+// noise.
+constexpr float kSmallestWindow_m = 0.015f;
 
-/// Puts one row's readings into the sorted lists of their columns: a comparator chain without branches.
+/// Puts one row's readings beyond `beyond` into the sorted lists of their columns: a comparator chain without
+/// branches.
 KNAV_MULTIVERSION
-void insert_row(const float* z_m, int width, float range_max_m, float* smallest) {
+void insert_row(const float* z_m, int width, const float* beyond_m, float range_max_m, float* smallest) {
   float* s0 = smallest;
   float *s1 = s0 + width, *s2 = s1 + width, *s3 = s2 + width, *s4 = s3 + width, *s5 = s4 + width,
         *s6 = s5 + width, *s7 = s6 + width;
 #pragma GCC ivdep
   for (int u = 0; u < width; ++u) {
-    float value = z_m[u] <= range_max_m ? z_m[u] : kInf;
+    const float z = z_m[u];
+    float value = z <= range_max_m ? z : kInf;
+    value = z > beyond_m[u] ? value : kInf;
     float kept;
 #define KNAV_COMPARE(list)               \
   kept = list[u];                        \
@@ -65,43 +72,53 @@ void ColumnSurface::configure(int support_rows, double window_per_m, double rang
 
 void ColumnSurface::find(const cv::Mat& sliced) {
   const auto width = static_cast<std::size_t>(sliced.cols);
-  smallest_.assign(width * kKept, kInf);
-  nearest_m_.resize(width);
-  window_end_m_.resize(width);
-  for (int v = 0; v < sliced.rows; ++v)
-    insert_row(sliced.ptr<float>(v), sliced.cols, range_max_m_, smallest_.data());
+  nearest_m_.assign(width, kNaN);
+  window_end_m_.assign(width, kNaN);
+  beyond_m_.assign(width, 0.0f);
+  first_m_.assign(width, kNaN);
+  // Where all of the smallest readings are strays, which is rare, the next ones are looked at.
+  for (int round = 0; round < kRounds; ++round) {
+    smallest_.assign(width * kKept, kInf);
+    for (int v = 0; v < sliced.rows; ++v) {
+      insert_row(sliced.ptr<float>(v), sliced.cols, beyond_m_.data(), range_max_m_, smallest_.data());
+    }
+    bool more = false;
+    for (std::size_t u = 0; u < width; ++u) {
+      if (!std::isnan(nearest_m_[u]) || std::isinf(beyond_m_[u])) continue;
+      float sorted[kKept];
+      for (std::size_t k = 0; k < kKept; ++k) sorted[k] = smallest_[k * width + u];
+      if (round == 0 && std::isfinite(sorted[0])) first_m_[u] = sorted[0];
+      nearest_m_[u] = first_supported(sorted);
+      const bool full = std::isfinite(sorted[kKept - 1]);
+      // The last ones may belong to a surface that goes on: they are looked at again.
+      const int again = std::max(0, kKept - support_rows_);
+      beyond_m_[u] = full && std::isnan(nearest_m_[u]) ? sorted[again] : kInf;
+      more = more || !std::isinf(beyond_m_[u]);
+    }
+    if (!more) break;
+  }
   for (std::size_t u = 0; u < width; ++u) {
-    float sorted[kKept];
-    for (std::size_t k = 0; k < kKept; ++k) sorted[k] = smallest_[k * width + u];
-    float nearest = first_supported(sorted, kKept);
-    // All the smallest are strays: look at the whole column, which is rare.
-    if (std::isnan(nearest) && std::isfinite(sorted[kKept - 1]))
-      nearest = search_column(sliced, static_cast<int>(u));
-    nearest_m_[u] = nearest;
-    const float end_per_m = 1.0f / nearest - window_per_m_;
-    window_end_m_[u] = std::isnan(nearest)               ? kNaN
-                       : end_per_m > 1.0f / range_max_m_ ? 1.0f / end_per_m
-                                                         : range_max_m_;
+    // Dozens of readings, none near another: something slanting and ragged, whose nearest point is the safe
+    // answer.
+    if (std::isnan(nearest_m_[u]) && !std::isinf(beyond_m_[u])) nearest_m_[u] = first_m_[u];
+    window_end_m_[u] = window_end(nearest_m_[u]);
   }
 }
 
-float ColumnSurface::first_supported(const float* sorted, int count) const {
-  for (int i = 0; i + support_rows_ <= count; ++i) {
+float ColumnSurface::window_end(float nearest_m) const {
+  if (std::isnan(nearest_m)) return kNaN;
+  const float end_per_m = 1.0f / nearest_m - window_per_m_;
+  const float by_noise = end_per_m > 1.0f / range_max_m_ ? 1.0f / end_per_m : range_max_m_;
+  return std::min(range_max_m_, std::max(by_noise, nearest_m + kSmallestWindow_m));
+}
+
+float ColumnSurface::first_supported(const float* sorted) const {
+  for (int i = 0; i + support_rows_ <= kKept; ++i) {
     const float last = sorted[i + support_rows_ - 1];
     if (!std::isfinite(last)) break;
-    if (1.0f / sorted[i] - 1.0f / last <= window_per_m_) return sorted[i];
+    if (last <= window_end(sorted[i])) return sorted[i];
   }
   return kNaN;
-}
-
-float ColumnSurface::search_column(const cv::Mat& sliced, int u) {
-  column_.clear();
-  for (int v = 0; v < sliced.rows; ++v) {
-    const float z = sliced.ptr<float>(v)[u];
-    if (z <= range_max_m_) column_.push_back(z);
-  }
-  std::sort(column_.begin(), column_.end());
-  return first_supported(column_.data(), static_cast<int>(column_.size()));
 }
 
 void ColumnSurface::average(const cv::Mat& sliced, std::vector<float>* z_m) {

@@ -27,15 +27,15 @@ class ColumnSurface {
   static void minimum(const cv::Mat& sliced, double range_max_m, std::vector<float>* z_m);
 
  private:
-  float first_supported(const float* sorted, int count) const;
-  float search_column(const cv::Mat& sliced, int u);
+  float first_supported(const float* sorted) const;
+  float window_end(float nearest_m) const;
 
   int support_rows_ = 3;
   float window_per_m_ = 0.01f;
   float range_max_m_ = 20.0f;
   std::vector<float>
       smallest_;  // the eight smallest readings of each column: eight rows, sorted down the rows
-  std::vector<float> nearest_m_, window_end_m_, sum_, count_, column_;
+  std::vector<float> nearest_m_, window_end_m_, beyond_m_, first_m_, sum_, count_;
 };
 
 }  // namespace knav

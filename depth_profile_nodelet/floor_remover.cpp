@@ -47,31 +47,37 @@ void follow_row(const float* z_m, const float* x, int width, const RowTerms& ter
                 float* sweep_rows, float* sweep_seen) {
   const RowTerms t = terms;
   const FollowTerms f = follow;
+  // Every value is loaded before it is chosen between, and masks are 0 / 1: else the loop does not vectorise.
 #pragma GCC ivdep
   for (int u = 0; u < width; ++u) {
+    const float z = z_m[u], to = free_to[u], from = free_from[u], was_alive = alive[u];
     const float forward_ray = t.forward_x * x[u] + t.forward_row;
     const float up_ray = t.up_x * x[u] + t.up_row;
-    const float forward = z_m[u] * forward_ray;
-    const float height = z_m[u] * up_ray + t.height_m;
-    const bool down = up_ray < -1e-4f;
-    const float expected =
-        t.height_m * forward_ray / (down ? -up_ray : 1e-4f);  // where this row meets the floor
+    const float forward = z * forward_ray;
+    const float height = z * up_ray + t.height_m;
+    const float fall = up_ray < -1e-4f ? -up_ray : 1e-4f;
+    const float expected = t.height_m * forward_ray / fall;  // where this row meets the floor
     const float low = t.bottom_m + t.bottom_per_m * forward;
-    const bool on_floor = down & (expected < f.follow_to_m) & (forward < 2.0f * f.follow_to_m) &
-                          (height <= low) & (height >= -low);
-    const bool started = free_to[u] > 0.0f;
-    const bool gap = started & !on_floor & (expected > free_to[u] * (1.0f + f.gap_per_m) + f.gap_m);
-    const float living = gap ? 0.0f : alive[u];
+    const float size = height < 0.0f ? -height : height;
+    float on_floor = size <= low ? 1.0f : 0.0f;
+    on_floor = expected < f.follow_to_m ? on_floor : 0.0f;
+    on_floor = forward < 2.0f * f.follow_to_m ? on_floor : 0.0f;
+    float gap = expected > to * (1.0f + f.gap_per_m) + f.gap_m ? 1.0f - on_floor : 0.0f;
+    gap = to > 0.0f ? gap : 0.0f;  // it has not begun yet
+    const float living = gap > 0.0f ? 0.0f : was_alive;
+    const float follows = on_floor * living;
+    const float nearer = expected < from ? expected : from;
+    const float farther = expected > to ? expected : to;
     alive[u] = living;
-    const bool follows = on_floor & (living > 0.0f);
-    free_from[u] = follows & (expected < free_from[u]) ? expected : free_from[u];
-    free_to[u] = follows & (expected > free_to[u]) ? expected : free_to[u];
-    floor_rows[u] += follows ? 1.0f : 0.0f;
-    const bool below = (height < -(f.below_m + f.below_per_m * forward)) & (forward < 2.0f * f.floor_range_m);
-    below_rows[u] += below ? 1.0f : 0.0f;
-    const bool sweeps = down & (expected > f.floor_range_m);
-    sweep_rows[u] += sweeps ? 1.0f : 0.0f;
-    sweep_seen[u] += sweeps & (z_m[u] > 0.0f) ? 1.0f : 0.0f;
+    free_from[u] = follows > 0.0f ? nearer : from;
+    free_to[u] = follows > 0.0f ? farther : to;
+    floor_rows[u] += follows;
+    const float below = height < -(f.below_m + f.below_per_m * forward) ? 1.0f : 0.0f;
+    below_rows[u] += forward < 2.0f * f.floor_range_m ? below : 0.0f;
+    float sweeps = expected > f.floor_range_m ? 1.0f : 0.0f;
+    sweeps = up_ray < -1e-4f ? sweeps : 0.0f;
+    sweep_rows[u] += sweeps;
+    sweep_seen[u] += z > 0.0f ? sweeps : 0.0f;
   }
 }
 

@@ -56,10 +56,10 @@ struct FloorResult {
   FloorPlane plane;  ///< in the camera's optical frame
   FloorSource source = FloorSource::kMount;
   double vote_fraction = 0.0;
-  /// Levelled forward distance, NaN = nothing seen free. Where free_to reaches the nearest surface it ends at the far
-  /// side of that surface's noise; ProfileExtractor ends it at the surface.
+  /// Levelled forward distance, NaN = nothing seen free. Where free_to reaches the nearest surface it ends at
+  /// the far side of that surface's noise; ProfileExtractor ends it at the surface.
   std::vector<float> free_from_m, free_to_m;
-  std::vector<HeightClass> height_class;      ///< of the nearest supported obstacle
+  std::vector<HeightClass> height_class;  ///< of the nearest supported obstacle
 };
 
 /// Paper section III.C: takes the floor and what is above 2 m out of the image and levels the rest: each kept
