@@ -14,7 +14,7 @@
 #include "openni2_driver/openni2_camera_config.h"
 #include "planner_tracker/planner_tracker_config.h"
 #include "tsdf_local_mapper/local_mapper_config.h"
-#include "tsdf_localizer/localizer_config.h"
+#include "tsdf_localizer/localizer_node_config.h"
 
 namespace knav {
 namespace {
@@ -47,7 +47,7 @@ std::vector<Section> all_sections() {
       section<MappingRecorderConfig>("mapping_recorder", "Records the mapping drive."),
       section<BuildMapConfig>("map_builder", "From a recording to a map (build_map)."),
       section<MapServerConfig>("map_server", "Publishes a map directory."),
-      section<LocalizerConfig>("localizer", "Where the robot is in the map."),
+      section<LocalizerNodeConfig>("localizer", "Where the robot is in the map."),
       section<PlannerTrackerConfig>("planner_tracker", "Takes the robot to goals."),
       section<SimulatorNodeConfig>("simulator", "The simulated robot and building."),
       section<TourDriverConfig>("tour_driver", "Drives a script in the simulator, as a person would."),

@@ -1,8 +1,13 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cmath>
+#include <exception>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/pose2.h"
 #include "tsdf_localizer/localizer_config.h"
 
 namespace knav {
@@ -17,7 +22,7 @@ struct LocalizerNodeConfig {
   double transform_tolerance = 0.1;
   bool tf_broadcast = true;
   double tf_rate_hz = 30.0;
-  double initial_pose_x = 0.0, initial_pose_y = 0.0, initial_pose_a = 0.0;
+  std::string initial_pose_x, initial_pose_y, initial_pose_a;  ///< texts, so that they can be left open
   double initial_cov_xx = 0.25, initial_cov_yy = 0.25, initial_cov_aa = 0.0685;
   double save_pose_rate = 0.2;
   std::string saved_pose_file = "auto";
@@ -36,10 +41,10 @@ struct LocalizerNodeConfig {
              "How far the published map->odom is post-dated (amcl).");
     v.flag("tf_broadcast", tf_broadcast, "Publish map->odom (amcl).");
     v.number("tf_rate_hz", tf_rate_hz, 1, 1000, "Hz", "Rate of map->odom, whatever the scans do.");
-    v.number("initial_pose_x", initial_pose_x, -1e6, 1e6, "m",
-             "Pose to start from, used if any of the three is set (amcl).");
-    v.number("initial_pose_y", initial_pose_y, -1e6, 1e6, "m", "Pose to start from (amcl).");
-    v.number("initial_pose_a", initial_pose_a, -1e6, 1e6, "rad", "Pose to start from: heading (amcl).");
+    v.text("initial_pose_x", initial_pose_x,
+           "Pose to start from [m]; all three empty: unknown, see saved_pose_file (amcl).");
+    v.text("initial_pose_y", initial_pose_y, "Pose to start from [m] (amcl).");
+    v.text("initial_pose_a", initial_pose_a, "Pose to start from: heading [rad] (amcl).");
     v.number("initial_cov_xx", initial_cov_xx, 0, 1e6, "m^2",
              "Variance of that pose, and of one given without (amcl).");
     v.number("initial_cov_yy", initial_cov_yy, 0, 1e6, "m^2",
@@ -67,7 +72,33 @@ struct LocalizerNodeConfig {
                global_frame_id == base_frame_id) {
       faults.push_back("global_frame_id, odom_frame_id and base_frame_id must differ.");
     }
+    for (const std::string* text : {&initial_pose_x, &initial_pose_y, &initial_pose_a}) {
+      if (!text->empty() && !parse(*text)) {
+        faults.push_back("initial_pose_x, _y and _a must be finite numbers, or empty; one is '" + *text +
+                         "'.");
+      }
+    }
     return faults;
+  }
+  /// Nothing if all three are empty; one that is empty beside others is 0.
+  std::optional<Pose2> initial_pose() const {
+    if (initial_pose_x.empty() && initial_pose_y.empty() && initial_pose_a.empty()) return std::nullopt;
+    return Pose2{parse(initial_pose_x).value_or(0.0), parse(initial_pose_y).value_or(0.0),
+                 parse(initial_pose_a).value_or(0.0)};
+  }
+  Eigen::Matrix3d initial_covariance() const {
+    return Eigen::Vector3d(initial_cov_xx, initial_cov_yy, initial_cov_aa).asDiagonal();
+  }
+
+ private:
+  static std::optional<double> parse(const std::string& text) {
+    try {
+      std::size_t used = 0;
+      const double value = std::stod(text, &used);
+      if (used == text.size() && std::isfinite(value)) return value;
+    } catch (const std::exception&) {
+    }
+    return std::nullopt;
   }
 };
 

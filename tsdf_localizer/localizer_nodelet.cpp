@@ -36,8 +36,6 @@ void LocalizerNodelet::start() {
   ros::NodeHandle& nh = getNodeHandle();
   ros::NodeHandle& private_nh = getPrivateNodeHandle();
   config_ = read_parameters<LocalizerNodeConfig>(private_nh);
-  has_initial_pose_ = private_nh.hasParam("initial_pose_x") || private_nh.hasParam("initial_pose_y") ||
-                      private_nh.hasParam("initial_pose_a");
   saved_pose_file_ = saved_pose_path(config_.saved_pose_file);
   localizer_ = std::make_unique<Localizer>(config_.localizer);
   broadcaster_ = std::make_unique<MapOdomBroadcaster>(config_.global_frame_id, config_.odom_frame_id,
@@ -108,19 +106,16 @@ bool LocalizerNodelet::take_map(const DistanceMap& map, const std::string& sourc
 }
 
 void LocalizerNodelet::begin() {
-  if (has_initial_pose_) {
-    const Eigen::Vector3d variance(config_.initial_cov_xx, config_.initial_cov_yy, config_.initial_cov_aa);
-    localizer_->initialize({config_.initial_pose_x, config_.initial_pose_y, config_.initial_pose_a},
-                           variance.asDiagonal());
-    NODELET_INFO("localizer: starting from initial_pose_x, _y, _a = %.2f, %.2f, %.2f.",
-                 config_.initial_pose_x, config_.initial_pose_y, config_.initial_pose_a);
+  if (const auto pose = config_.initial_pose()) {
+    localizer_->initialize(*pose, config_.initial_covariance());
+    NODELET_INFO("localizer: starting from initial_pose_x, _y, _a = %.2f, %.2f, %.2f.", pose->x_m, pose->y_m,
+                 pose->yaw_rad);
     return;
   }
   try {
     const auto saved = load_saved_pose(saved_pose_file_);
     if (saved && saved->map_checksum == checksum_) {
-      const Eigen::Vector3d variance(config_.initial_cov_xx, config_.initial_cov_yy, config_.initial_cov_aa);
-      localizer_->initialize(saved->T_map_base, variance.asDiagonal(), Localizer::Trust::kSaved);
+      localizer_->initialize(saved->T_map_base, config_.initial_covariance(), Localizer::Trust::kSaved);
       NODELET_INFO("localizer: trying the pose saved in %s: %.2f, %.2f, %.2f.", saved_pose_file_.c_str(),
                    saved->T_map_base.x_m, saved->T_map_base.y_m, saved->T_map_base.yaw_rad);
       return;

@@ -55,7 +55,6 @@ class LocalizerNodelet : public NodeletBase {
   void remember_pose(double now_s, bool at_end);
 
   LocalizerNodeConfig config_;
-  bool has_initial_pose_ = false;
   std::unique_ptr<Localizer> localizer_;
   tf2_ros::Buffer tf_;
   std::unique_ptr<tf2_ros::TransformListener> listener_;
