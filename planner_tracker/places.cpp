@@ -9,7 +9,10 @@
 namespace knav {
 
 std::map<std::string, Pose2> load_places(const std::string& path) {
-  const std::string file = std::filesystem::is_directory(path) ? path + "/places.yaml" : path;
+  namespace fs = std::filesystem;
+  std::string file = path;
+  if (fs::is_directory(path)) file = (fs::path(path) / "places.yaml").string();
+  else if (fs::path(path).filename() == "map.yaml") file = (fs::path(path).parent_path() / "places.yaml").string();
   const YAML::Node root = load_yaml_file(file);
   std::map<std::string, Pose2> places;
   if (root.IsNull()) return places;

@@ -17,6 +17,8 @@ namespace {
 
 /// Map, distance map and keepout come as three messages of one load: they are taken together after this silence.
 constexpr double kMapSettles_s = 0.3;
+/// An overlay of 20 x 20 m takes 4 ms: not at every frame of the mapper.
+constexpr double kOverlayEvery_s = 0.14;
 
 nav_msgs::Path path_message(const std::vector<Point2>& points, const std::string& frame, const ros::Time& stamp,
                             const Pose2* end) {
@@ -108,13 +110,9 @@ void PlannerTrackerNodelet::rebuild_map() {
   // A clock that jumped back must not delay this for ever.
   if (!map_dirty_ || std::abs((now - map_changed_).toSec()) < kMapSettles_s) return;
   map_dirty_ = false;
-  const auto load = [&](bool with_distance, bool with_keepout) {
-    planner_->set_map(with_distance && distance_ ? distance_map_from(*distance_) : DistanceMap{},
-                      map_ ? occupancy_from(*map_) : OccupancyGrid{},
-                      with_keepout && keepout_ ? occupancy_from(*keepout_) : OccupancyGrid{});
-  };
   try {
-    load(true, true);
+    planner_->set_map(distance_ ? distance_map_from(*distance_) : DistanceMap{}, map_ ? occupancy_from(*map_) : OccupancyGrid{},
+                      keepout_ ? occupancy_from(*keepout_) : OccupancyGrid{});
     NODELET_INFO("Map taken: %d x %d cells.", planner_->map().global().geometry.width_cells,
                  planner_->map().global().geometry.height_cells);
   } catch (const UserError& error) {
@@ -171,13 +169,15 @@ bool PlannerTrackerNodelet::transform(const std::string& target, const std::stri
 }
 
 void PlannerTrackerNodelet::overlay_local_map() {
-  if (!local_ || planner_->map().empty()) return;
+  const ros::Time now = ros::Time::now();
+  if (!local_ || planner_->map().empty() || std::abs((now - overlaid_).toSec()) < kOverlayEvery_s) return;
   Pose2 T_map_local;
   if (!transform(config_.global_frame, local_->header.frame_id, local_->header.stamp, &T_map_local, nullptr)) {
     // Not there yet: asked again at the next step, but an old one is no use.
     if ((ros::Time::now() - local_->header.stamp).toSec() > 1.0) local_.reset();
     return;
   }
+  overlaid_ = now;
   try {
     planner_->set_local_map(occupancy_from(*local_), T_map_local);
   } catch (const UserError& error) {
@@ -234,7 +234,7 @@ void PlannerTrackerNodelet::announce(Activity activity) {
   std_msgs::String text;
   text.data = why.empty() ? to_string(activity) : std::string(to_string(activity)) + ": " + why;
   activity_pub_.publish(text);
-  if (news && !text.data.empty()) NODELET_INFO("%s", text.data.c_str());
+  if (news && activity != Activity::kFailed) NODELET_INFO("%s", text.data.c_str());
 }
 
 void PlannerTrackerNodelet::finish(const Command& command) {

@@ -81,7 +81,7 @@ class PlannerTrackerNodelet : public NodeletBase {
 
   nav_msgs::OccupancyGrid::ConstPtr map_, keepout_, local_;
   kinect_nav::DistanceMap::ConstPtr distance_;
-  ros::Time map_changed_;
+  ros::Time map_changed_, overlaid_;
   bool map_dirty_ = false;
   RangeScan scan_;
   std::map<std::string, Pose2> sensor_pose_;  ///< T_base_sensor by frame, looked up once

@@ -21,7 +21,7 @@ struct CellWindow {
 
 /// Exact squared Euclidean distance in cells to the nearest blocked cell, cut at (reach + 1)^2. The same numbers as
 /// core's euclidean_distance_m() as far as it reaches, but of a window of a larger grid, on 16-bit integers that the
-/// compiler vectorises: 10 x less time at a reach of 18 cells (planner_benchmark).
+/// compiler vectorises: 14 ms instead of 82 ms for 3.7 million cells at a reach of 14 (benchmark_planner).
 class TruncatedDistance {
  public:
   explicit TruncatedDistance(int reach_cells);
