@@ -56,7 +56,7 @@ class Localizer {
                                 std::uint32_t epoch, const Pose2* T_odom_base = nullptr);
 
   const LocalizerResult& result() const;
-  /// At the stamp of the last result.
+  /// At the stamp of the last scan that was weighed (LocalizerResult::filter_updated).
   const ParticleSet& particles() const;
 
  private:
