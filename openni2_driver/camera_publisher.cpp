@@ -7,8 +7,8 @@
 
 namespace knav {
 
-sensor_msgs::CameraInfoPtr scaled_camera_info(const sensor_msgs::CameraInfo& calibration, int width_px, int height_px,
-                                              double offset_x_px, double offset_y_px) {
+sensor_msgs::CameraInfoPtr scaled_camera_info(const sensor_msgs::CameraInfo& calibration, int width_px,
+                                              int height_px, double offset_x_px, double offset_y_px) {
   if (calibration.width == 0 || calibration.height == 0 ||
       static_cast<int>(calibration.width) * height_px != static_cast<int>(calibration.height) * width_px) {
     return nullptr;
@@ -31,15 +31,14 @@ sensor_msgs::CameraInfoPtr scaled_camera_info(const sensor_msgs::CameraInfo& cal
   return info;
 }
 
-CameraPublisher::CameraPublisher(ros::NodeHandle& node, SensorStream stream, const OpenNI2CameraConfig& config,
-                                 std::function<void(bool)> on_subscribers)
+CameraPublisher::CameraPublisher(ros::NodeHandle& node, SensorStream stream,
+                                 const OpenNI2CameraConfig& config, std::function<void(bool)> on_subscribers)
     : stream_(stream), config_(config) {
   const bool depth = stream == SensorStream::kDepth;
   frame_id_ = depth ? config.depth_frame_id : config.ir_frame_id;
   time_offset_s_ = depth ? config.depth_time_offset : config.ir_time_offset;
-  const ros::SubscriberStatusCallback changed = [this, on_subscribers](const ros::SingleSubscriberPublisher&) {
-    on_subscribers(subscribed());
-  };
+  const ros::SubscriberStatusCallback changed =
+      [this, on_subscribers](const ros::SingleSubscriberPublisher&) { on_subscribers(subscribed()); };
   const std::string image_topic = depth ? "camera/depth/image_raw" : "camera/ir/image";
   const std::string info_topic = depth ? "camera/depth/camera_info" : "camera/ir/camera_info";
   std::lock_guard<std::mutex> lock(mutex_);
@@ -52,12 +51,13 @@ bool CameraPublisher::subscribed() const {
   return image_.getNumSubscribers() + info_.getNumSubscribers() > 0;
 }
 
-sensor_msgs::CameraInfoPtr CameraPublisher::camera_info(const SensorFrame& frame,
-                                                        camera_info_manager::CameraInfoManager* calibration) const {
+sensor_msgs::CameraInfoPtr CameraPublisher::camera_info(
+    const SensorFrame& frame, camera_info_manager::CameraInfoManager* calibration) const {
   if (calibration != nullptr && calibration->isCalibrated()) {
     const bool depth = stream_ == SensorStream::kDepth;
-    auto info = scaled_camera_info(calibration->getCameraInfo(), frame.width_px, frame.height_px,
-                                   depth ? config_.depth_ir_offset_x : 0.0, depth ? config_.depth_ir_offset_y : 0.0);
+    auto info =
+        scaled_camera_info(calibration->getCameraInfo(), frame.width_px, frame.height_px,
+                           depth ? config_.depth_ir_offset_x : 0.0, depth ? config_.depth_ir_offset_y : 0.0);
     if (info) return info;
     ROS_WARN_ONCE("The IR camera's calibration has other proportions than its %dx%d images; it is not used.",
                   frame.width_px, frame.height_px);

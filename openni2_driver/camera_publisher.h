@@ -16,8 +16,8 @@
 
 namespace knav {
 
-/// One stream's image and camera_info topics. Everything but the subscriber's comings and goings happens in the
-/// device's thread.
+/// One stream's image and camera_info topics. Everything but the subscriber's comings and goings happens in
+/// the device's thread.
 class CameraPublisher {
  public:
   /// @param on_subscribers called with whether anybody listens, whenever that may have changed
@@ -41,9 +41,9 @@ class CameraPublisher {
   ros::Publisher image_, info_;
 };
 
-/// The camera_info of a depth image from that of the IR camera, or of the IR image itself (offset 0): scaled to the
-/// image's size, the principal point moved. Null if the calibration's proportions are not the image's.
-sensor_msgs::CameraInfoPtr scaled_camera_info(const sensor_msgs::CameraInfo& calibration, int width_px, int height_px,
-                                              double offset_x_px, double offset_y_px);
+/// The camera_info of a depth image from that of the IR camera, or of the IR image itself (offset 0): scaled
+/// to the image's size, the principal point moved. Null if the calibration's proportions are not the image's.
+sensor_msgs::CameraInfoPtr scaled_camera_info(const sensor_msgs::CameraInfo& calibration, int width_px,
+                                              int height_px, double offset_x_px, double offset_y_px);
 
 }  // namespace knav

@@ -5,7 +5,8 @@
 
 namespace knav {
 
-DeviceClock::DeviceClock(std::size_t window, double jump_s) : window_(std::max<std::size_t>(window, 1)), jump_s_(jump_s) {
+DeviceClock::DeviceClock(std::size_t window, double jump_s)
+    : window_(std::max<std::size_t>(window, 1)), jump_s_(jump_s) {
   differences_s_.reserve(window_);
   sorted_.reserve(window_);
 }
@@ -36,7 +37,8 @@ double DeviceClock::to_host_s(uint64_t device_time_us, double arrival_s) {
   std::nth_element(sorted_.begin(), middle, sorted_.end());
   offset_s_ = *middle;
 
-  // A frame was not taken after it arrived, and no two frames have one stamp (1 us is what ROS stamps keep apart).
+  // A frame was not taken after it arrived, and no two frames have one stamp (1 us is what ROS stamps keep
+  // apart).
   double host_s = std::min(device_s + offset_s_, arrival_s);
   if (any_ && host_s <= last_s_) host_s = last_s_ + 1e-6;
   last_s_ = host_s;

@@ -6,17 +6,19 @@
 
 namespace knav {
 
-/// Maps a device's clock (microseconds from an arbitrary zero) to host time. A frame's arrival is late by a jittering
-/// time; the median of the last differences host - device is not moved by single late frames (as openni2_camera does).
+/// Maps a device's clock (microseconds from an arbitrary zero) to host time. A frame's arrival is late by a
+/// jittering time; the median of the last differences host - device is not moved by single late frames (as
+/// openni2_camera does).
 class DeviceClock {
  public:
   /// @param window how many differences the median is taken over
-  /// @param jump_s a difference that lies farther than this from the median is another zero, not a late frame: the
+  /// @param jump_s a difference that lies farther than this from the median is another zero, not a late
+  /// frame: the
   ///   device restarted, a recording began again, or the host's clock was set. The history is dropped then.
   explicit DeviceClock(std::size_t window = 15, double jump_s = 0.5);
 
-  /// Host time [s] of a frame with the device's time, which arrived at `arrival_s`. Never later than the arrival, and
-  /// always after the previous frame's unless the mapping jumped.
+  /// Host time [s] of a frame with the device's time, which arrived at `arrival_s`. Never later than the
+  /// arrival, and always after the previous frame's unless the mapping jumped.
   double to_host_s(uint64_t device_time_us, double arrival_s);
   void reset();
 

@@ -1,10 +1,10 @@
 #include <diagnostic_updater/diagnostic_updater.h>
-#include <pluginlib/class_list_macros.hpp>
 
 #include <atomic>
 #include <cctype>
 #include <memory>
 #include <mutex>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "openni2_driver/camera_publisher.h"
 #include "openni2_driver/openni_device.h"
@@ -18,7 +18,8 @@ class OpenNI2CameraNodelet final : public NodeletBase {
  public:
   ~OpenNI2CameraNodelet() override {
     timer_.stop();
-    // First the device, whose thread uses the publishers; not under the lock, which that thread may be waiting for.
+    // First the device, whose thread uses the publishers; not under the lock, which that thread may be
+    // waiting for.
     std::unique_ptr<OpenNIDevice> device;
     {
       std::lock_guard<std::mutex> lock(device_mutex_);
@@ -50,7 +51,8 @@ class OpenNI2CameraNodelet final : public NodeletBase {
       device_->request(static_cast<SensorStream>(i), publishers_[i]->subscribed());
     }
     // Wall time: diagnostics are wanted most when nothing drives a simulated clock.
-    timer_ = node.createWallTimer(ros::WallDuration(0.5), [this](const ros::WallTimerEvent&) { updater_->update(); });
+    timer_ = node.createWallTimer(ros::WallDuration(0.5),
+                                  [this](const ros::WallTimerEvent&) { updater_->update(); });
   }
 
   void publish(const SensorFrame& frame) {
@@ -102,7 +104,9 @@ class OpenNI2CameraNodelet final : public NodeletBase {
     }
     if (!status.serial.empty()) updater_->setHardwareID(status.serial);
     const bool well = status.state == DeviceState::kIdle || status.state == DeviceState::kStreaming;
-    out.summary(!well ? Level::ERROR : status.problem.empty() ? Level::OK : Level::WARN,
+    out.summary(!well                    ? Level::ERROR
+                : status.problem.empty() ? Level::OK
+                                         : Level::WARN,
                 status.problem.empty() ? to_string(status.state) : status.problem);
     const uint64_t frames[] = {status.frames[0], status.frames[1]};
     const ros::WallTime now = ros::WallTime::now();
@@ -122,7 +126,8 @@ class OpenNI2CameraNodelet final : public NodeletBase {
       out.add(name + " frames", frames[i]);
       out.add(name + " frames missed", status.missed_frames[i]);
       const bool measured = !last_diagnosis_.isZero() && seconds > 0.0;
-      out.addf(name + " rate [Hz]", "%.1f", measured ? static_cast<double>(frames[i] - last_frames_[i]) / seconds : 0.0);
+      out.addf(name + " rate [Hz]", "%.1f",
+               measured ? static_cast<double>(frames[i] - last_frames_[i]) / seconds : 0.0);
       last_frames_[i] = frames[i];
     }
     out.addf("host minus device clock [s]", "%.6f", offset_s_.load());

@@ -5,6 +5,7 @@
 #include <chrono>
 
 #include "core/error.h"
+#include "openni2_driver/parked_thread.h"
 
 namespace knav {
 namespace {
@@ -19,17 +20,25 @@ constexpr double kPollPeriodS = 0.1;
 
 const char* to_string(DeviceState state) {
   switch (state) {
-    case DeviceState::kSearching: return "searching";
-    case DeviceState::kIdle: return "idle";
-    case DeviceState::kStreaming: return "streaming";
-    case DeviceState::kStalled: return "stalled";
-    case DeviceState::kEnded: return "ended";
+    case DeviceState::kSearching:
+      return "searching";
+    case DeviceState::kIdle:
+      return "idle";
+    case DeviceState::kStreaming:
+      return "streaming";
+    case DeviceState::kStalled:
+      return "stalled";
+    case DeviceState::kEnded:
+      return "ended";
   }
   return "unknown";
 }
 
 OpenNIDevice::OpenNIDevice(const OpenNIDeviceConfig& config, FrameHandler on_frame, EventHandler on_event)
-    : config_(config), on_frame_(std::move(on_frame)), on_event_(std::move(on_event)), thread_([this] { run(); }) {}
+    : config_(config),
+      on_frame_(std::move(on_frame)),
+      on_event_(std::move(on_event)),
+      finished_(run_on_parked_thread([this] { run(); })) {}
 
 OpenNIDevice::~OpenNIDevice() {
   {
@@ -37,7 +46,7 @@ OpenNIDevice::~OpenNIDevice() {
     stop_ = true;
   }
   wake_.notify_all();
-  thread_.join();
+  finished_.wait();
 }
 
 void OpenNIDevice::request(SensorStream stream, bool on) {
@@ -115,8 +124,9 @@ bool OpenNIDevice::open() {
   }
   if (!was_stalled) {
     reported_.clear();
-    on_event_(false, fmt::format("Opened {} {}, serial number {} ({}).", session_->vendor(), session_->name(),
-                                 session_->serial().empty() ? "unknown" : session_->serial(), session_->uri()));
+    on_event_(false,
+              fmt::format("Opened {} {}, serial number {} ({}).", session_->vendor(), session_->name(),
+                          session_->serial().empty() ? "unknown" : session_->serial(), session_->uri()));
   }
   return true;
 }
@@ -154,7 +164,8 @@ void OpenNIDevice::apply_requests() {
   if (started || !any) last_frame_s_ = steady_s();
   if (!problem.empty()) report_problem(problem);
   std::lock_guard<std::mutex> lock(mutex_);
-  if (status_.state != DeviceState::kStalled) status_.state = any ? DeviceState::kStreaming : DeviceState::kIdle;
+  if (status_.state != DeviceState::kStalled)
+    status_.state = any ? DeviceState::kStreaming : DeviceState::kIdle;
   if (!wanted[0] && !wanted[1]) {
     status_.state = DeviceState::kIdle;
     status_.problem.clear();
@@ -212,7 +223,8 @@ void OpenNIDevice::run() {
       continue;
     }
     apply_requests();
-    const bool streaming = session_->streaming(SensorStream::kDepth) || session_->streaming(SensorStream::kInfrared);
+    const bool streaming =
+        session_->streaming(SensorStream::kDepth) || session_->streaming(SensorStream::kInfrared);
     if (streaming) read_frames();
 
     const std::string uri = session_->uri();
@@ -224,7 +236,8 @@ void OpenNIDevice::run() {
       ended = !config_.enable_reconnect;
       lost_ = true;
       close(ended ? DeviceState::kEnded : DeviceState::kSearching,
-            uri + (ended ? ": was unplugged, and enable_reconnect is false." : ": was unplugged. Waiting for it."));
+            uri + (ended ? ": was unplugged, and enable_reconnect is false."
+                         : ": was unplugged. Waiting for it."));
     } else if (session_->at_end_of_file() && !config_.playback_repeat) {
       ended = true;
       close(DeviceState::kEnded, uri + ": the recording is at its end.");
@@ -234,7 +247,8 @@ void OpenNIDevice::run() {
         ++status_.stalls;
         status_.state = DeviceState::kStalled;
       }
-      const std::string problem = fmt::format("{}: sent no frame for {:.1f} s.", uri, config_.stall_timeout_s);
+      const std::string problem =
+          fmt::format("{}: sent no frame for {:.1f} s.", uri, config_.stall_timeout_s);
       if (config_.enable_reconnect) {
         close(DeviceState::kStalled, problem + " Opening it again until it does.");
       } else {

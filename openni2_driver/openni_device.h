@@ -3,10 +3,10 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 
 #include "openni2_driver/openni2_camera_config.h"
 #include "openni2_driver/openni_session.h"
@@ -34,16 +34,16 @@ struct DeviceStatus {
   uint64_t missed_frames[kSensorStreamCount] = {0, 0};  ///< gaps in the frame index
 };
 
-/// An OpenNI2 device or .oni file that is opened when it is there, read while somebody wants images, and found again
-/// after it was unplugged or stalled. A thread of its own owns everything of OpenNI2.
+/// An OpenNI2 device or .oni file that is opened when it is there, read while somebody wants images, and
+/// found again after it was unplugged or stalled. A thread of its own owns everything of OpenNI2.
 class OpenNIDevice {
  public:
   using FrameHandler = std::function<void(const SensorFrame&)>;
   /// @param fault true for a loss or a problem, false for its end
   using EventHandler = std::function<void(bool fault, const std::string& sentence)>;
 
-  /// Returns at once, whether the device is there or not. Handlers are called from the device's thread; an event is
-  /// told once, however long it lasts.
+  /// Returns at once, whether the device is there or not. Handlers are called from the device's thread; an
+  /// event is told once, however long it lasts.
   OpenNIDevice(const OpenNIDeviceConfig& config, FrameHandler on_frame, EventHandler on_event);
   ~OpenNIDevice();
   OpenNIDevice(const OpenNIDevice&) = delete;
@@ -83,7 +83,7 @@ class OpenNIDevice {
   std::string reported_;
   bool lost_ = false;  // was unplugged: that it is not there has been said
 
-  std::thread thread_;
+  std::future<void> finished_;
 };
 
 }  // namespace knav

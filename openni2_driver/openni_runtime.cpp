@@ -31,8 +31,10 @@ class Runtime final : public OpenNIRuntime,
     if (openni::OpenNI::initialize() != openni::STATUS_OK) {
       const std::string why = extended_error();
       openni::OpenNI::shutdown();
-      throw UserError(fmt::format("OpenNI2 does not start: {}. Its drivers must lie in OpenNI2/Drivers beside "
-                                  "libOpenNI2.so.0, see docs/driver.md.", why));
+      throw UserError(
+          fmt::format("OpenNI2 does not start: {}. Its drivers must lie in OpenNI2/Drivers beside "
+                      "libOpenNI2.so.0, see docs/driver.md.",
+                      why));
     }
     openni::OpenNI::addDeviceDisconnectedListener(this);
     openni::OpenNI::addDeviceStateChangedListener(this);
@@ -61,7 +63,8 @@ class Runtime final : public OpenNIRuntime,
     if (device.open(uri.c_str()) != openni::STATUS_OK) return "";
     std::array<char, 256> text{};
     int size = static_cast<int>(text.size());
-    const bool known = device.getProperty(ONI_DEVICE_PROPERTY_SERIAL_NUMBER, text.data(), &size) == openni::STATUS_OK;
+    const bool known =
+        device.getProperty(ONI_DEVICE_PROPERTY_SERIAL_NUMBER, text.data(), &size) == openni::STATUS_OK;
     device.close();
     text.back() = '\0';
     return known ? text.data() : "";
@@ -100,7 +103,8 @@ std::string connected_list(const std::vector<ConnectedDevice>& devices) {
   if (devices.empty()) return "no device is connected";
   std::string text = "connected:";
   for (std::size_t i = 0; i < devices.size(); ++i) {
-    text += fmt::format("{} #{} {} {} ({})", i == 0 ? "" : ",", i + 1, devices[i].vendor, devices[i].name, devices[i].uri);
+    text += fmt::format("{} #{} {} {} ({})", i == 0 ? "" : ",", i + 1, devices[i].vendor, devices[i].name,
+                        devices[i].uri);
   }
   return text;
 }
@@ -127,11 +131,14 @@ std::shared_ptr<OpenNIRuntime> OpenNIRuntime::acquire() {
 
 ResolvedDevice resolve_device(const OpenNIRuntime& runtime, const std::string& device_id) {
   const std::string scheme = "file://";
-  const std::string path = device_id.compare(0, scheme.size(), scheme) == 0 ? device_id.substr(scheme.size()) : device_id;
+  const std::string path =
+      device_id.compare(0, scheme.size(), scheme) == 0 ? device_id.substr(scheme.size()) : device_id;
   if (file_exists(path)) return {path, true, ""};
   if (ends_with(path, ".oni")) {
-    return missing(fmt::format("device_id: there is no recording '{}'; give an absolute path, since a node's working "
-                               "directory is ROS_HOME.", path));
+    return missing(
+        fmt::format("device_id: there is no recording '{}'; give an absolute path, since a node's working "
+                    "directory is ROS_HOME.",
+                    path));
   }
 
   const std::vector<ConnectedDevice> devices = runtime.devices();
@@ -142,15 +149,18 @@ ResolvedDevice resolve_device(const OpenNIRuntime& runtime, const std::string& d
     if (parsed.ec != std::errc() || parsed.ptr != end || number < 1) {
       return missing(fmt::format("device_id: '{}' is no device; '#1' is the first one.", device_id));
     }
-    if (static_cast<std::size_t>(number) <= devices.size()) return {devices[static_cast<std::size_t>(number) - 1].uri, false, ""};
-    return missing(fmt::format("device_id: there is no device '{}' ({}).", device_id, connected_list(devices)));
+    if (static_cast<std::size_t>(number) <= devices.size())
+      return {devices[static_cast<std::size_t>(number) - 1].uri, false, ""};
+    return missing(
+        fmt::format("device_id: there is no device '{}' ({}).", device_id, connected_list(devices)));
   }
   for (const ConnectedDevice& device : devices) {
     // "bus@number", openni2_camera's way, is the end of "vendor/product@bus/number".
     std::string place = device_id;
     const std::size_t at = place.find('@');
     if (at != std::string::npos) place[at] = '/';
-    if (device.uri == device_id || (at != std::string::npos && at > 0 && ends_with(device.uri, "@" + place))) {
+    if (device.uri == device_id ||
+        (at != std::string::npos && at > 0 && ends_with(device.uri, "@" + place))) {
       return {device.uri, false, ""};
     }
   }

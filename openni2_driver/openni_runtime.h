@@ -21,8 +21,8 @@ struct ResolvedDevice {
   std::string problem;  ///< one sentence that says why uri is empty and what is connected
 };
 
-/// The OpenNI2 library, initialised once for the process and shut down with the last user. Remembers which devices
-/// were unplugged and which recordings ended.
+/// The OpenNI2 library, initialised once for the process and shut down with the last user. Remembers which
+/// devices were unplugged and which recordings ended.
 class OpenNIRuntime {
  public:
   /// UserError if the library finds no driver.

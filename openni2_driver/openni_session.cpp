@@ -1,5 +1,6 @@
 #include "openni2_driver/openni_session.h"
 
+#include <OniCAPI.h>
 #include <OpenNI.h>
 #include <fmt/format.h>
 
@@ -33,20 +34,27 @@ std::string last_error() {
   return text.empty() ? "no reason given" : text;
 }
 
-/// The driver's thread only says that there is a frame: what it calls must not call OpenNI2 back.
-class FrameSignal final : public openni::VideoStream::NewFrameListener {
+/// Wakes the reader when a stream has a frame. Over the C interface: the C++ listener calls OpenNI2 back from
+/// the stream's thread, which ends with the stream, and that is deadly later (parked_thread.h).
+class FrameSignal {
  public:
   explicit FrameSignal(std::function<void()> wake) : wake_(std::move(wake)) {}
-  void onNewFrame(openni::VideoStream&) override { wake_(); }
+  bool connect(OniStreamHandle stream) {
+    return oniStreamRegisterNewFrameCallback(
+               stream, [](OniStreamHandle, void* self) { static_cast<FrameSignal*>(self)->wake_(); }, this,
+               &handle_) == ONI_STATUS_OK;
+  }
+  void disconnect(OniStreamHandle stream) { oniStreamUnregisterNewFrameCallback(stream, handle_); }
 
  private:
   std::function<void()> wake_;
+  OniCallbackHandle handle_ = nullptr;
 };
 
 struct OpenStream {
   explicit OpenStream(const std::function<void()>& wake) : signal(wake) {}
+  FrameSignal signal;  // before the stream, which may still call it while it is destroyed
   openni::VideoStream stream;
-  FrameSignal signal;
   double horizontal_fov_rad = 0.0, vertical_fov_rad = 0.0;
   bool mirrored = false;
 };
@@ -76,11 +84,11 @@ struct OpenNISession::Parts {
         continue;
       }
       if (stream.setVideoMode(modes[i]) == openni::STATUS_OK) return;
-      throw UserError(fmt::format("{}: refuses {} for its {} stream: {}", uri, mode_text(modes[i]), stream_name(which),
-                                  last_error()));
+      throw UserError(fmt::format("{}: refuses {} for its {} stream: {}", uri, mode_text(modes[i]),
+                                  stream_name(which), last_error()));
     }
-    throw UserError(fmt::format("{}: has no {} mode {}x{}@{} (width_px, height_px, rate_hz); it offers {}.", uri,
-                                stream_name(which), config.width_px, config.height_px, config.rate_hz,
+    throw UserError(fmt::format("{}: has no {} mode {}x{}@{} (width_px, height_px, rate_hz); it offers {}.",
+                                uri, stream_name(which), config.width_px, config.height_px, config.rate_hz,
                                 offered.empty() ? "none in mm or 16 bit grey" : offered));
   }
 
@@ -98,10 +106,9 @@ struct OpenNISession::Parts {
     open->mirrored = stream.getMirroringEnabled();
     open->horizontal_fov_rad = static_cast<double>(stream.getHorizontalFieldOfView());
     open->vertical_fov_rad = static_cast<double>(stream.getVerticalFieldOfView());
-    stream.addNewFrameListener(&open->signal);
-    if (stream.start() != openni::STATUS_OK) {
-      stream.removeNewFrameListener(&open->signal);
-      throw UserError(fmt::format("{}: its {} stream does not start: {}", uri, stream_name(which), last_error()));
+    if (!open->signal.connect(stream._getHandle()) || stream.start() != openni::STATUS_OK) {
+      throw UserError(
+          fmt::format("{}: its {} stream does not start: {}", uri, stream_name(which), last_error()));
     }
     streams[static_cast<std::size_t>(which)] = std::move(open);
   }
@@ -109,8 +116,8 @@ struct OpenNISession::Parts {
   void stop(SensorStream which) {
     auto& open = streams[static_cast<std::size_t>(which)];
     if (!open) return;
-    open->stream.removeNewFrameListener(&open->signal);
     open->stream.stop();
+    open->signal.disconnect(open->stream._getHandle());
     open->stream.destroy();
     open.reset();
   }
@@ -130,8 +137,9 @@ OpenNISession::OpenNISession(std::shared_ptr<OpenNIRuntime> runtime, const Resol
   if (p.device.open(p.uri.c_str()) != openni::STATUS_OK) {
     throw UserError(fmt::format(
         "{}: cannot be opened: {}. {}", p.uri, last_error(),
-        p.is_file ? "Is it a .oni recording, and is the OniFile driver beside the others (docs/driver.md)?"
-                  : "Does another program use it, and may you use its USB port (udev rules, docs/driver.md)?"));
+        p.is_file
+            ? "Is it a .oni recording, and is the OniFile driver beside the others (docs/driver.md)?"
+            : "Does another program use it, and may you use its USB port (udev rules, docs/driver.md)?"));
   }
   const openni::DeviceInfo& info = p.device.getDeviceInfo();
   p.vendor = info.getVendor();
@@ -176,9 +184,11 @@ bool OpenNISession::streaming(SensorStream stream) const {
 bool OpenNISession::read(const std::function<void(const SensorFrame&)>& handle) {
   // Without a wait: OpenNI2's own wait begins anew with every frame of any device of the process.
   std::array<openni::VideoStream*, kSensorStreamCount> streams{};
-  for (std::size_t i = 0; i < streams.size(); ++i) streams[i] = parts_->streams[i] ? &parts_->streams[i]->stream : nullptr;
+  for (std::size_t i = 0; i < streams.size(); ++i)
+    streams[i] = parts_->streams[i] ? &parts_->streams[i]->stream : nullptr;
   int ready = -1;
-  if (openni::OpenNI::waitForAnyStream(streams.data(), kSensorStreamCount, &ready, 0) != openni::STATUS_OK || ready < 0) {
+  if (openni::OpenNI::waitForAnyStream(streams.data(), kSensorStreamCount, &ready, 0) != openni::STATUS_OK ||
+      ready < 0) {
     return false;
   }
   OpenStream& open = *parts_->streams[static_cast<std::size_t>(ready)];
@@ -188,15 +198,17 @@ bool OpenNISession::read(const std::function<void(const SensorFrame&)>& handle) 
   SensorFrame frame;
   frame.stream = static_cast<SensorStream>(ready);
   if (!wanted_format(frame.stream, image.getVideoMode().getPixelFormat())) {
-    throw UserError(fmt::format("{}: its {} frames come in OpenNI2's pixel format {}, not in mm or 16 bit grey.", uri(),
-                                stream_name(frame.stream), static_cast<int>(image.getVideoMode().getPixelFormat())));
+    throw UserError(
+        fmt::format("{}: its {} frames come in OpenNI2's pixel format {}, not in mm or 16 bit grey.", uri(),
+                    stream_name(frame.stream), static_cast<int>(image.getVideoMode().getPixelFormat())));
   }
   frame.pixels = static_cast<const uint16_t*>(image.getData());
   frame.width_px = image.getWidth();
   frame.height_px = image.getHeight();
   frame.stride_px = image.getStrideInBytes() / static_cast<int>(sizeof(uint16_t));
   if (frame.stride_px < frame.width_px ||
-      image.getDataSize() < (frame.stride_px * (frame.height_px - 1) + frame.width_px) * static_cast<int>(sizeof(uint16_t))) {
+      image.getDataSize() <
+          (frame.stride_px * (frame.height_px - 1) + frame.width_px) * static_cast<int>(sizeof(uint16_t))) {
     return true;  // a frame cut short is dropped; its index makes the gap seen
   }
   frame.units_per_mm = image.getVideoMode().getPixelFormat() == openni::PIXEL_FORMAT_DEPTH_100_UM ? 10 : 1;
@@ -209,7 +221,9 @@ bool OpenNISession::read(const std::function<void(const SensorFrame&)>& handle) 
   return true;
 }
 
-bool OpenNISession::unplugged() const { return parts_->runtime->disconnections(parts_->uri) != parts_->disconnections; }
+bool OpenNISession::unplugged() const {
+  return parts_->runtime->disconnections(parts_->uri) != parts_->disconnections;
+}
 bool OpenNISession::at_end_of_file() const {
   return parts_->is_file && parts_->runtime->ends_of_file(parts_->uri) != parts_->ends_of_file;
 }

@@ -14,16 +14,17 @@ namespace knav {
 /// All calls from one thread.
 class OpenNISession {
  public:
-  /// UserError if the device cannot be opened. `wake` is called from the driver's thread when a frame is ready.
-  OpenNISession(std::shared_ptr<OpenNIRuntime> runtime, const ResolvedDevice& device, const OpenNIDeviceConfig& config,
-                std::function<void()> wake);
+  /// UserError if the device cannot be opened. `wake` is called from the driver's thread when a frame is
+  /// ready.
+  OpenNISession(std::shared_ptr<OpenNIRuntime> runtime, const ResolvedDevice& device,
+                const OpenNIDeviceConfig& config, std::function<void()> wake);
   ~OpenNISession();
 
   /// Starts or stops a stream; UserError if the device has none or refuses the mode.
   void set_streaming(SensorStream stream, bool on);
   bool streaming(SensorStream stream) const;
-  /// Hands over one waiting frame, if there is one. Never blocks. UserError for a pixel format that is neither depth
-  /// nor grey.
+  /// Hands over one waiting frame, if there is one. Never blocks. UserError for a pixel format that is
+  /// neither depth nor grey.
   bool read(const std::function<void(const SensorFrame&)>& handle);
 
   bool unplugged() const;

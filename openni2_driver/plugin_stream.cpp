@@ -20,18 +20,26 @@ PluginStream::PluginStream(OniSensorType type, std::vector<OniVideoMode> modes, 
 
 OniStatus PluginStream::getProperty(int property, void* data, int* size) {
   switch (property) {
-    case ONI_STREAM_PROPERTY_VIDEO_MODE: return answer(mode_, data, size);
-    case ONI_STREAM_PROPERTY_HORIZONTAL_FOV: return answer(horizontal_fov_rad(mode_), data, size);
-    case ONI_STREAM_PROPERTY_VERTICAL_FOV: return answer(vertical_fov_rad(mode_), data, size);
-    case ONI_STREAM_PROPERTY_MIN_VALUE: return answer(0, data, size);
-    case ONI_STREAM_PROPERTY_MAX_VALUE: return answer(max_value_, data, size);
-    case ONI_STREAM_PROPERTY_STRIDE: return answer(mode_.resolutionX * 2, data, size);
-    case ONI_STREAM_PROPERTY_MIRRORING: return answer(OniBool{FALSE}, data, size);
+    case ONI_STREAM_PROPERTY_VIDEO_MODE:
+      return answer(mode_, data, size);
+    case ONI_STREAM_PROPERTY_HORIZONTAL_FOV:
+      return answer(horizontal_fov_rad(mode_), data, size);
+    case ONI_STREAM_PROPERTY_VERTICAL_FOV:
+      return answer(vertical_fov_rad(mode_), data, size);
+    case ONI_STREAM_PROPERTY_MIN_VALUE:
+      return answer(0, data, size);
+    case ONI_STREAM_PROPERTY_MAX_VALUE:
+      return answer(max_value_, data, size);
+    case ONI_STREAM_PROPERTY_STRIDE:
+      return answer(mode_.resolutionX * 2, data, size);
+    case ONI_STREAM_PROPERTY_MIRRORING:
+      return answer(OniBool{FALSE}, data, size);
     case ONI_STREAM_PROPERTY_CROPPING: {
       const OniCropping whole = {FALSE, 0, 0, mode_.resolutionX, mode_.resolutionY};
       return answer(whole, data, size);
     }
-    default: return ONI_STATUS_NOT_IMPLEMENTED;
+    default:
+      return ONI_STATUS_NOT_IMPLEMENTED;
   }
 }
 
@@ -65,8 +73,10 @@ OniBool PluginStream::isPropertySupported(int property) {
     case ONI_STREAM_PROPERTY_MAX_VALUE:
     case ONI_STREAM_PROPERTY_STRIDE:
     case ONI_STREAM_PROPERTY_MIRRORING:
-    case ONI_STREAM_PROPERTY_CROPPING: return TRUE;
-    default: return FALSE;
+    case ONI_STREAM_PROPERTY_CROPPING:
+      return TRUE;
+    default:
+      return FALSE;
   }
 }
 

@@ -11,8 +11,9 @@
 
 namespace knav {
 
-/// The properties every stream of our plugins answers for. OpenNI2's recorder wants all of them: without CROPPING a
-/// recording plays back no frames at all, and pixels at or above MAX_VALUE are recorded wrongly, without a word.
+/// The properties every stream of our plugins answers for. OpenNI2's recorder wants all of them: without
+/// CROPPING a recording plays back no frames at all, and pixels at or above MAX_VALUE are recorded wrongly,
+/// without a word.
 class PluginStream : public oni::driver::StreamBase {
  public:
   /// @param modes the stream's; the first is the one it begins with
@@ -28,7 +29,8 @@ class PluginStream : public oni::driver::StreamBase {
   virtual float vertical_fov_rad(const OniVideoMode& mode) const = 0;
 
   OniVideoMode mode() const { return mode_; }
-  /// A frame of the current mode with everything but its pixels filled in; null if the runtime has none to give.
+  /// A frame of the current mode with everything but its pixels filled in; null if the runtime has none to
+  /// give.
   OniFrame* begin_frame(uint64_t time_us, int index);
   /// Hands it to the runtime.
   void end_frame(OniFrame* frame);

@@ -13,9 +13,10 @@ struct SensorFrame {
   const uint16_t* pixels = nullptr;  ///< depth in units of 1 / units_per_mm, 0 invalid; or IR intensity
   int width_px = 0;
   int height_px = 0;
-  int stride_px = 0;         ///< from one row's start to the next's
-  int units_per_mm = 1;      ///< depth: 1, or 10 for devices that count in 100 um
-  bool mirrored = false;     ///< columns run from right to left (a device or recording that cannot be told otherwise)
+  int stride_px = 0;     ///< from one row's start to the next's
+  int units_per_mm = 1;  ///< depth: 1, or 10 for devices that count in 100 um
+  bool mirrored =
+      false;  ///< columns run from right to left (a device or recording that cannot be told otherwise)
   uint64_t device_time_us = 0;  ///< from an arbitrary zero
   int index = 0;
   double horizontal_fov_rad = 0.0;

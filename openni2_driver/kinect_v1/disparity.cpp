@@ -4,8 +4,8 @@
 
 namespace knav {
 
-// Codes count eighths of a pixel of the 640 column image, quarters of one of the 1280 column sensor; the 3/8 is the
-// firmware's rounding. Similar triangles over the zero plane give the rest.
+// Codes count eighths of a pixel of the 640 column image, quarters of one of the 1280 column sensor; the 3/8
+// is the firmware's rounding. Similar triangles over the zero plane give the rest.
 double depth_of_code_mm(double code, const ZeroPlane& plane) {
   const double shift_px = (code - 4.0 * plane.const_shift) / 4.0 - 0.375;
   const double shift_cm = shift_px * plane.pixel_size_cm;
@@ -18,7 +18,8 @@ DisparityTable::DisparityTable(const ZeroPlane& plane) {
   for (int code = 0; code < static_cast<int>(table_mm_.size()); ++code) {
     const double depth_mm = depth_of_code_mm(code, plane);
     const bool plausible = code != kNoReading && depth_mm >= kNearestMm && depth_mm <= kFarthestMm;
-    table_mm_[static_cast<std::size_t>(code)] = plausible ? static_cast<uint16_t>(std::lround(depth_mm)) : uint16_t{0};
+    table_mm_[static_cast<std::size_t>(code)] =
+        plausible ? static_cast<uint16_t>(std::lround(depth_mm)) : uint16_t{0};
   }
 }
 

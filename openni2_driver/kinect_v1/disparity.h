@@ -16,8 +16,9 @@ struct ZeroPlane {
   double focal_px() const { return reference_distance_cm / (2.0 * pixel_size_cm); }
 };
 
-/// Millimetres of the raw 11-bit codes. The stock conversion clamps at 10 m and wraps around beyond code 1087 or so,
-/// where the formula turns negative; this one goes on to max_mm and answers 0 (invalid) for what lies outside.
+/// Millimetres of the raw 11-bit codes. The stock conversion clamps at 10 m and wraps around beyond code 1087
+/// or so, where the formula turns negative; this one goes on to max_mm and answers 0 (invalid) for what lies
+/// outside.
 class DisparityTable {
  public:
   static constexpr int kNoReading = 2047;

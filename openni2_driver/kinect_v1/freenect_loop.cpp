@@ -17,7 +17,9 @@ namespace {
 constexpr int kEventTimeoutUs = 20000;
 constexpr std::chrono::milliseconds kLookPeriod(1000);
 
-KinectFrames* frames_of(freenect_device* device) { return static_cast<KinectFrames*>(freenect_get_user(device)); }
+KinectFrames* frames_of(freenect_device* device) {
+  return static_cast<KinectFrames*>(freenect_get_user(device));
+}
 
 void depth_callback(freenect_device* device, void* depth, uint32_t ticks) {
   frames_of(device)->on_depth(static_cast<const uint16_t*>(depth), ticks);
@@ -30,7 +32,8 @@ void video_callback(freenect_device* device, void* video, uint32_t ticks) {
 freenect_frame_mode ir_mode() {
   for (int i = 0; i < freenect_get_video_mode_count(); ++i) {
     const freenect_frame_mode mode = freenect_get_video_mode(i);
-    if (mode.is_valid != 0 && mode.video_format == FREENECT_VIDEO_IR_10BIT && mode.width == 640 && mode.height >= 480) {
+    if (mode.is_valid != 0 && mode.video_format == FREENECT_VIDEO_IR_10BIT && mode.width == 640 &&
+        mode.height >= 480) {
       return mode;
     }
   }
@@ -50,7 +53,8 @@ std::vector<KinectOnUsb> list_kinects(freenect_context* context) {
   if (freenect_list_device_attributes != nullptr && freenect_free_device_attributes != nullptr) {
     freenect_device_attributes* attributes = nullptr;
     if (freenect_list_device_attributes(context, &attributes) < 0) return list;
-    for (auto* a = attributes; a != nullptr; a = a->next) add(a->camera_serial == nullptr ? "" : a->camera_serial);
+    for (auto* a = attributes; a != nullptr; a = a->next)
+      add(a->camera_serial == nullptr ? "" : a->camera_serial);
     freenect_free_device_attributes(attributes);
   } else {
     for (int i = 0; i < freenect_num_devices(context); ++i) add("");
@@ -102,7 +106,8 @@ void FreenectLoop::run() {
     }
     if (context_ != nullptr && std::chrono::steady_clock::now() >= next_look) {
       next_look = std::chrono::steady_clock::now() + kLookPeriod;
-      // Reading serial numbers opens every Kinect, so while one streams that is done only when their number changed.
+      // Reading serial numbers opens every Kinect, so while one streams that is done only when their number
+      // changed.
       const int now = freenect_num_devices(context_);
       if (open_.empty() || now != count) look_for_kinects();
       count = now;
@@ -160,7 +165,8 @@ void FreenectLoop::lose_open_kinects() {
     std::lock_guard<std::mutex> lock(mutex_);
     for (const auto& [device, kinect] : open_) {
       const std::string& uri = kinect.uri;
-      const auto at = std::find_if(kinects_.begin(), kinects_.end(), [&](const KinectOnUsb& k) { return k.uri == uri; });
+      const auto at =
+          std::find_if(kinects_.begin(), kinects_.end(), [&](const KinectOnUsb& k) { return k.uri == uri; });
       if (at == kinects_.end()) continue;  // told before
       lost.push_back(*at);
       kinects_.erase(at);
@@ -193,15 +199,17 @@ freenect_device* FreenectLoop::open(const KinectOnUsb& kinect, KinectFrames* fra
 void FreenectLoop::close(freenect_device* device) {
   in_loop([&] {
     freenect_close_device(device);
-    open_.erase(std::remove_if(open_.begin(), open_.end(), [&](const auto& entry) { return entry.first == device; }),
-                open_.end());
+    open_.erase(
+        std::remove_if(open_.begin(), open_.end(), [&](const auto& entry) { return entry.first == device; }),
+        open_.end());
   });
 }
 
 bool FreenectLoop::start_depth(freenect_device* device) {
   bool started = false;
   in_loop([&] {
-    const freenect_frame_mode mode = freenect_find_depth_mode(FREENECT_RESOLUTION_MEDIUM, FREENECT_DEPTH_11BIT);
+    const freenect_frame_mode mode =
+        freenect_find_depth_mode(FREENECT_RESOLUTION_MEDIUM, FREENECT_DEPTH_11BIT);
     started = freenect_set_depth_mode(device, mode) >= 0 && freenect_start_depth(device) >= 0;
   });
   return started;
@@ -211,7 +219,8 @@ bool FreenectLoop::start_ir(freenect_device* device) {
   bool started = false;
   in_loop([&] {
     const freenect_frame_mode mode = ir_mode();
-    started = mode.is_valid != 0 && freenect_set_video_mode(device, mode) >= 0 && freenect_start_video(device) >= 0;
+    started =
+        mode.is_valid != 0 && freenect_set_video_mode(device, mode) >= 0 && freenect_start_video(device) >= 0;
   });
   return started;
 }
@@ -232,8 +241,8 @@ ZeroPlane FreenectLoop::zero_plane(freenect_device* device) {
     freenect_registration registration = freenect_copy_registration(device);
     const freenect_zero_plane_info& told = registration.zero_plane_info;
     // A device that could not be asked tells zeros.
-    if (told.dcmos_emitter_dist > 1.0F && told.reference_distance > 10.0F && told.reference_pixel_size > 0.01F &&
-        registration.const_shift > 0.0) {
+    if (told.dcmos_emitter_dist > 1.0F && told.reference_distance > 10.0F &&
+        told.reference_pixel_size > 0.01F && registration.const_shift > 0.0) {
       plane.emitter_distance_cm = static_cast<double>(told.dcmos_emitter_dist);
       plane.reference_distance_cm = static_cast<double>(told.reference_distance);
       plane.pixel_size_cm = static_cast<double>(told.reference_pixel_size);

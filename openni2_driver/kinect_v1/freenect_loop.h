@@ -28,8 +28,8 @@ class KinectFrames {
   virtual void on_ir(const uint16_t* pixels, uint32_t ticks) = 0;
 };
 
-/// Owns libfreenect, which may be used from one thread only: looks for Kinects once a second, pumps the USB events
-/// of the open ones, and notices when one is gone.
+/// Owns libfreenect, which may be used from one thread only: looks for Kinects once a second, pumps the USB
+/// events of the open ones, and notices when one is gone.
 class FreenectLoop {
  public:
   /// @param on_change called from the loop's thread when a Kinect comes (true) or goes

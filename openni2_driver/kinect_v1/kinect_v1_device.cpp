@@ -10,13 +10,16 @@ namespace {
 constexpr int kWidth = 640, kHeight = 480, kRateHz = 30;
 
 std::vector<OniVideoMode> modes_of(OniSensorType type) {
-  return {{type == ONI_SENSOR_DEPTH ? ONI_PIXEL_FORMAT_DEPTH_1_MM : ONI_PIXEL_FORMAT_GRAY16, kWidth, kHeight, kRateHz}};
+  return {{type == ONI_SENSOR_DEPTH ? ONI_PIXEL_FORMAT_DEPTH_1_MM : ONI_PIXEL_FORMAT_GRAY16, kWidth, kHeight,
+           kRateHz}};
 }
 
 }  // namespace
 
 KinectV1Stream::KinectV1Stream(OniSensorType type, KinectV1Device& device)
-    : PluginStream(type, modes_of(type), type == ONI_SENSOR_DEPTH ? 65535 : 1024), type_(type), device_(device) {}
+    : PluginStream(type, modes_of(type), type == ONI_SENSOR_DEPTH ? 65535 : 1024),
+      type_(type),
+      device_(device) {}
 
 KinectV1Stream::~KinectV1Stream() { stop(); }
 
@@ -59,7 +62,10 @@ void KinectV1Stream::send(const uint16_t* raw, uint64_t time_us) {
 }
 
 KinectV1Device::KinectV1Device(FreenectLoop& loop, const KinectOnUsb& kinect)
-    : loop_(loop), kinect_(kinect), depth_modes_(modes_of(ONI_SENSOR_DEPTH)), ir_modes_(modes_of(ONI_SENSOR_IR)) {
+    : loop_(loop),
+      kinect_(kinect),
+      depth_modes_(modes_of(ONI_SENSOR_DEPTH)),
+      ir_modes_(modes_of(ONI_SENSOR_IR)) {
   sensors_[0] = {ONI_SENSOR_DEPTH, 1, depth_modes_.data()};
   sensors_[1] = {ONI_SENSOR_IR, 1, ir_modes_.data()};
   handle_ = loop_.open(kinect, this);
@@ -100,7 +106,8 @@ void KinectV1Device::destroyStream(oni::driver::StreamBase* stream) {
 }
 
 OniStatus KinectV1Device::getProperty(int property, void* data, int* size) {
-  if (property != ONI_DEVICE_PROPERTY_SERIAL_NUMBER || kinect_.serial.empty()) return ONI_STATUS_NOT_IMPLEMENTED;
+  if (property != ONI_DEVICE_PROPERTY_SERIAL_NUMBER || kinect_.serial.empty())
+    return ONI_STATUS_NOT_IMPLEMENTED;
   const int needed = static_cast<int>(kinect_.serial.size()) + 1;
   if (*size < needed) return ONI_STATUS_BAD_PARAMETER;
   std::memcpy(data, kinect_.serial.c_str(), static_cast<std::size_t>(needed));

@@ -1,4 +1,5 @@
-// OpenNI2's driver for the Kinect v1, over libfreenect: raw disparity to millimetres beyond 20 m, and the IR image.
+// OpenNI2's driver for the Kinect v1, over libfreenect: raw disparity to millimetres beyond 20 m, and the IR
+// image.
 
 #include <cstdio>
 #include <map>
@@ -13,10 +14,12 @@ class KinectV1Driver final : public oni::driver::DriverBase {
  public:
   explicit KinectV1Driver(OniDriverServices* services) : DriverBase(services) {}
 
-  OniStatus initialize(oni::driver::DeviceConnectedCallback connected, oni::driver::DeviceDisconnectedCallback disconnected,
+  OniStatus initialize(oni::driver::DeviceConnectedCallback connected,
+                       oni::driver::DeviceDisconnectedCallback disconnected,
                        oni::driver::DeviceStateChangedCallback state_changed, void* cookie) override {
     DriverBase::initialize(connected, disconnected, state_changed, cookie);
-    loop_ = std::make_unique<FreenectLoop>([this](const KinectOnUsb& kinect, bool here) { changed(kinect, here); });
+    loop_ = std::make_unique<FreenectLoop>(
+        [this](const KinectOnUsb& kinect, bool here) { changed(kinect, here); });
     return ONI_STATUS_OK;
   }
 

@@ -10,7 +10,8 @@ class TickClock {
   uint64_t to_us(uint32_t ticks) {
     if (!any_) last_ = ticks;
     any_ = true;
-    // The difference of two counters is right across the wrap; one that would be half a turn is a frame out of order.
+    // The difference of two counters is right across the wrap; one that would be half a turn is a frame out
+    // of order.
     const uint32_t step = ticks - last_;
     if (step < 0x80000000U) {
       total_ += step;

@@ -9,14 +9,16 @@
 
 namespace knav {
 
-/// A room with a closed formula, so that tests know every pixel: floor 0.5 m below the camera, ceiling 2.0 m above,
-/// side walls 3.0 m to the left and right, and a wall ahead at one of 381 distances, 1 to 20 m by 50 mm. It leaps
-/// through them in an order that covers the range within a second and tells the frame's number modulo 381.
+/// A room with a closed formula, so that tests know every pixel: floor 0.5 m below the camera, ceiling 2.0 m
+/// above, side walls 3.0 m to the left and right, and a wall ahead at one of 381 distances, 1 to 20 m by 50
+/// mm. It leaps through them in an order that covers the range within a second and tells the frame's number
+/// modulo 381.
 constexpr double kRoomFloorM = 0.5, kRoomCeilingM = 2.0, kRoomSideM = 3.0;
 constexpr int kRoomNearestMm = 1000, kRoomStepMm = 50, kRoomSteps = 381, kRoomLeap = 97;
 
 inline int room_wall_mm(uint64_t frame) {
-  return kRoomNearestMm + kRoomStepMm * (static_cast<int>(frame % static_cast<uint64_t>(kRoomSteps)) * kRoomLeap % kRoomSteps);
+  return kRoomNearestMm +
+         kRoomStepMm * (static_cast<int>(frame % static_cast<uint64_t>(kRoomSteps)) * kRoomLeap % kRoomSteps);
 }
 
 /// The frame, modulo 381, that shows the wall at this distance; -1 if none does.
@@ -37,7 +39,8 @@ inline double room_shell_mm(int u, int v, const VirtualCamera& camera) {
 }
 
 inline uint16_t room_depth_mm(int u, int v, uint64_t frame, const VirtualCamera& camera) {
-  return static_cast<uint16_t>(std::lround(std::min<double>(room_wall_mm(frame), room_shell_mm(u, v, camera))));
+  return static_cast<uint16_t>(
+      std::lround(std::min<double>(room_wall_mm(frame), room_shell_mm(u, v, camera))));
 }
 
 /// A chessboard with squares of 32 px that moves one column a frame.
@@ -49,7 +52,8 @@ inline uint16_t room_ir(int u, int v, uint64_t frame) {
 class AnalyticRoom final : public FrameSource {
  public:
   void render_depth(uint64_t frame, const VirtualCamera& camera, uint16_t* out) override {
-    const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
+    const auto pixels =
+        static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
     if (shell_mm_.size() != pixels) {
       shell_mm_.resize(pixels);
       for (int v = 0; v < camera.height_px; ++v) {

@@ -5,7 +5,8 @@
 
 namespace knav {
 
-/// The camera a virtual device pretends to be: a pinhole without distortion, its principal point in the middle.
+/// The camera a virtual device pretends to be: a pinhole without distortion, its principal point in the
+/// middle.
 struct VirtualCamera {
   int width_px = 640;
   int height_px = 480;
@@ -14,8 +15,8 @@ struct VirtualCamera {
   double cy_px() const { return 0.5 * (height_px - 1); }
 };
 
-/// What a virtual OpenNI2 device shows. The device calls it from one thread a stream, never twice at a time for one
-/// stream.
+/// What a virtual OpenNI2 device shows. The device calls it from one thread a stream, never twice at a time
+/// for one stream.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;

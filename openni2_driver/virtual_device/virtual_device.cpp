@@ -10,7 +10,8 @@ namespace {
 constexpr int64_t kDeviceZeroUs = 5000000;  // a device's clock starts anywhere
 
 int64_t steady_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now().time_since_epoch())
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
       .count();
 }
 
@@ -26,10 +27,15 @@ std::vector<OniVideoMode> virtual_modes(OniPixelFormat format) {
   return {{format, 640, 480, 30}, {format, 320, 240, 30}, {format, 320, 240, 60}};
 }
 
-VirtualStream::VirtualStream(OniSensorType type, std::shared_ptr<FrameSource> source, std::shared_ptr<VirtualCable> cable)
-    : PluginStream(type, virtual_modes(type == ONI_SENSOR_DEPTH ? ONI_PIXEL_FORMAT_DEPTH_1_MM : ONI_PIXEL_FORMAT_GRAY16),
-                   type == ONI_SENSOR_DEPTH ? 65535 : 1024),
-      is_depth_(type == ONI_SENSOR_DEPTH), source_(std::move(source)), cable_(std::move(cable)) {}
+VirtualStream::VirtualStream(OniSensorType type, std::shared_ptr<FrameSource> source,
+                             std::shared_ptr<VirtualCable> cable)
+    : PluginStream(
+          type,
+          virtual_modes(type == ONI_SENSOR_DEPTH ? ONI_PIXEL_FORMAT_DEPTH_1_MM : ONI_PIXEL_FORMAT_GRAY16),
+          type == ONI_SENSOR_DEPTH ? 65535 : 1024),
+      is_depth_(type == ONI_SENSOR_DEPTH),
+      source_(std::move(source)),
+      cable_(std::move(cable)) {}
 
 VirtualStream::~VirtualStream() { stop(); }
 
@@ -69,11 +75,13 @@ void VirtualStream::run() {
     if (due <= done || !cable_->plugged || !cable_->streaming) {
       const double next_us = static_cast<double>(plugged_at_us) + static_cast<double>(due + 1) * period_us;
       const auto pause_us = static_cast<int64_t>(next_us) - now_us + 1;
-      std::this_thread::sleep_for(std::chrono::microseconds(std::min<int64_t>(std::max<int64_t>(pause_us, 100), 20000)));
+      std::this_thread::sleep_for(
+          std::chrono::microseconds(std::min<int64_t>(std::max<int64_t>(pause_us, 100), 20000)));
       continue;
     }
     done = due;
-    const auto frame_time_us = static_cast<uint64_t>(kDeviceZeroUs + std::llround(static_cast<double>(due) * period_us));
+    const auto frame_time_us =
+        static_cast<uint64_t>(kDeviceZeroUs + std::llround(static_cast<double>(due) * period_us));
     OniFrame* frame = begin_frame(frame_time_us, static_cast<int>(due));
     if (frame == nullptr) continue;
     auto* pixels = static_cast<uint16_t*>(frame->data);
@@ -87,8 +95,11 @@ void VirtualStream::run() {
 }
 
 VirtualDevice::VirtualDevice(int index, std::shared_ptr<VirtualCable> cable)
-    : serial_(virtual_serial(index)), source_(make_frame_source(index)), cable_(std::move(cable)),
-      depth_modes_(virtual_modes(ONI_PIXEL_FORMAT_DEPTH_1_MM)), ir_modes_(virtual_modes(ONI_PIXEL_FORMAT_GRAY16)) {
+    : serial_(virtual_serial(index)),
+      source_(make_frame_source(index)),
+      cable_(std::move(cable)),
+      depth_modes_(virtual_modes(ONI_PIXEL_FORMAT_DEPTH_1_MM)),
+      ir_modes_(virtual_modes(ONI_PIXEL_FORMAT_GRAY16)) {
   sensors_[0] = {ONI_SENSOR_DEPTH, static_cast<int>(depth_modes_.size()), depth_modes_.data()};
   sensors_[1] = {ONI_SENSOR_IR, static_cast<int>(ir_modes_.size()), ir_modes_.data()};
 }

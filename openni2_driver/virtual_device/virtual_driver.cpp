@@ -1,5 +1,5 @@
-// The OpenNI2 driver of the virtual devices: KINECT_NAV_VIRTUAL_DEVICES of them (1), their cable in the hands of the
-// control file (control_file.h). Linked with one definition of make_frame_source().
+// The OpenNI2 driver of the virtual devices: KINECT_NAV_VIRTUAL_DEVICES of them (1), their cable in the hands
+// of the control file (control_file.h). Linked with one definition of make_frame_source().
 
 #include <algorithm>
 #include <cstdio>
@@ -17,7 +17,8 @@ std::string environment(const char* name) {
 }
 
 int64_t steady_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now().time_since_epoch())
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
       .count();
 }
 
@@ -28,7 +29,8 @@ class VirtualDriver final : public oni::driver::DriverBase {
   explicit VirtualDriver(OniDriverServices* services)
       : DriverBase(services), control_path_(environment("KINECT_NAV_VIRTUAL_CONTROL")) {}
 
-  OniStatus initialize(oni::driver::DeviceConnectedCallback connected, oni::driver::DeviceDisconnectedCallback disconnected,
+  OniStatus initialize(oni::driver::DeviceConnectedCallback connected,
+                       oni::driver::DeviceDisconnectedCallback disconnected,
                        oni::driver::DeviceStateChangedCallback state_changed, void* cookie) override {
     DriverBase::initialize(connected, disconnected, state_changed, cookie);
     const std::string count = environment("KINECT_NAV_VIRTUAL_DEVICES");

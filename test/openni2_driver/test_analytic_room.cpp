@@ -6,8 +6,8 @@
 
 using knav::VirtualCamera;
 
-// By hand, 640x480: floor at row 479 is 0.5 m * 585 / 239.5 = 1221.29 mm; ceiling at row 0 is 2 m * 585 / 239.5 =
-// 4885.18 mm; side at column 0 is 3 m * 585 / 319.5 = 5492.96 mm.
+// By hand, 640x480: floor at row 479 is 0.5 m * 585 / 239.5 = 1221.29 mm; ceiling at row 0 is 2 m * 585 /
+// 239.5 = 4885.18 mm; side at column 0 is 3 m * 585 / 319.5 = 5492.96 mm.
 TEST(AnalyticRoom, HasTheWallsItSays) {
   const VirtualCamera camera;
   const uint64_t far_frame = static_cast<uint64_t>(knav::room_frame_of_wall(20000));
@@ -37,7 +37,8 @@ TEST(AnalyticRoom, TheFastPathDrawsTheFormula) {
       room.render_depth(frame, camera, image.data());
       for (int v = 0; v < camera.height_px; ++v) {
         for (int u = 0; u < camera.width_px; ++u) {
-          ASSERT_EQ(image[static_cast<std::size_t>(v * camera.width_px + u)], knav::room_depth_mm(u, v, frame, camera));
+          ASSERT_EQ(image[static_cast<std::size_t>(v * camera.width_px + u)],
+                    knav::room_depth_mm(u, v, frame, camera));
         }
       }
     }

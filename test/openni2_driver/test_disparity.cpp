@@ -5,8 +5,8 @@
 
 using knav::DisparityTable;
 
-// By hand with the nominal numbers: code 1000 is a shift of (1000 - 800) / 4 - 0.375 = 49.625 px = 5.170925 cm;
-// 10 (5.170925 * 120 / (7.5 - 5.170925) + 120) = 3864.2 mm. Likewise 805: 0.091175 cm, 1214.8 mm, and
+// By hand with the nominal numbers: code 1000 is a shift of (1000 - 800) / 4 - 0.375 = 49.625 px = 5.170925
+// cm; 10 (5.170925 * 120 / (7.5 - 5.170925) + 120) = 3864.2 mm. Likewise 805: 0.091175 cm, 1214.8 mm, and
 // 1076: 7.150725 cm, 25767.6 mm.
 TEST(DisparityTable, FollowsTheZeroPlaneFormulaTo26M) {
   const DisparityTable table;
@@ -35,8 +35,12 @@ TEST(DisparityTable, GrowsWithTheCodeAndHasTheKinectsSteps) {
     // Below 0.6 m a code is less than a millimetre.
     EXPECT_GE(mm, mm < 600 ? before_mm : before_mm + 1) << code;
     // Known of the device: about 47 mm at 4 m and 290 mm at 10 m.
-    if (mm > 4000 && before_mm <= 4000) { EXPECT_NEAR(mm - before_mm, 47, 4); }
-    if (mm > 10000 && before_mm <= 10000) { EXPECT_NEAR(mm - before_mm, 290, 25); }
+    if (mm > 4000 && before_mm <= 4000) {
+      EXPECT_NEAR(mm - before_mm, 47, 4);
+    }
+    if (mm > 10000 && before_mm <= 10000) {
+      EXPECT_NEAR(mm - before_mm, 290, 25);
+    }
     before_mm = mm;
   }
 }

@@ -1,5 +1,5 @@
-// The Kinect v1 plugin in the real runtime, over libfreenect's fakenect and a dump written here. Run by ctest, which
-// puts our folder and fakenect's on LD_LIBRARY_PATH.
+// The Kinect v1 plugin in the real runtime, over libfreenect's fakenect and a dump written here. Run by
+// ctest, which puts our folder and fakenect's on LD_LIBRARY_PATH.
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
@@ -27,10 +27,12 @@ uint16_t code_at(int u, int v, int frame) {
   return static_cast<uint16_t>((v * kWidth + u + 37 * frame) % 2048);
 }
 
-/// fakenect plays its dump once in a process, so the tests share one and run in this order; the last sees its end.
+/// fakenect plays its dump once in a process, so the tests share one and run in this order; the last sees its
+/// end.
 class KinectV1Test : public ::testing::Test {
  protected:
-  /// libfreenect's format: an index, and a PGM with raw codes for every frame, named by time and the Kinect's ticks.
+  /// libfreenect's format: an index, and a PGM with raw codes for every frame, named by time and the Kinect's
+  /// ticks.
   static void SetUpTestSuite() {
     directory_ = ::testing::TempDir() + "kinect_nav_dump_" + std::to_string(getpid());
     mkdir(directory_.c_str(), 0700);
@@ -51,7 +53,8 @@ class KinectV1Test : public ::testing::Test {
       }
       std::vector<uint16_t> codes(static_cast<std::size_t>(kWidth * kHeight));
       for (int v = 0; v < kHeight; ++v) {
-        for (int u = 0; u < kWidth; ++u) codes[static_cast<std::size_t>(v * kWidth + u)] = code_at(u, v, frame);
+        for (int u = 0; u < kWidth; ++u)
+          codes[static_cast<std::size_t>(v * kWidth + u)] = code_at(u, v, frame);
       }
       std::ofstream file(path, std::ios::binary);
       file << "P5 640 480 65535\n";
@@ -124,7 +127,8 @@ TEST_F(KinectV1Test, RawDisparityArrivesAsMillimetresThenTheEndOfTheDumpIsAnUnpl
     EXPECT_EQ(wrong, 0) << "frame " << frame;
     if (i > 0) {
       const uint64_t step_us = images[i].device_time_us - images[i - 1].device_time_us;
-      EXPECT_NEAR(static_cast<double>(step_us) / 33333.3, std::round(static_cast<double>(step_us) / 33333.3), 0.001);
+      EXPECT_NEAR(static_cast<double>(step_us) / 33333.3, std::round(static_cast<double>(step_us) / 33333.3),
+                  0.001);
       EXPECT_LT(step_us, 200000U);
     }
   }

@@ -31,10 +31,11 @@ bool spin_until(const std::function<bool()>& condition, double timeout_s) {
 /// Every image of a topic, with its arrival.
 struct Listener {
   Listener(ros::NodeHandle& node, const std::string& topic)
-      : subscriber(node.subscribe<sensor_msgs::Image>(topic, 100, [this](const sensor_msgs::ImageConstPtr& image) {
-          images.push_back(image);
-          arrivals_s.push_back(ros::Time::now().toSec());
-        })) {}
+      : subscriber(
+            node.subscribe<sensor_msgs::Image>(topic, 100, [this](const sensor_msgs::ImageConstPtr& image) {
+              images.push_back(image);
+              arrivals_s.push_back(ros::Time::now().toSec());
+            })) {}
   std::vector<sensor_msgs::ImageConstPtr> images;
   std::vector<double> arrivals_s;
   ros::Subscriber subscriber;
@@ -104,7 +105,8 @@ TEST_F(OpenNI2Camera, PublishesDepthExactlyAtRate) {
   EXPECT_EQ(last.height, 480U);
   EXPECT_EQ(last.step, 1280U);
   EXPECT_EQ(last.is_bigendian, 0);
-  for (std::size_t i = 0; i < depth.images.size(); i += 5) EXPECT_EQ(wrong_pixels(*depth.images[i]), 0) << "image " << i;
+  for (std::size_t i = 0; i < depth.images.size(); i += 5)
+    EXPECT_EQ(wrong_pixels(*depth.images[i]), 0) << "image " << i;
   // 40 intervals of 1/30 s; a machine under load delays frames, and the stamps must not show it.
   const double span_s = (last.header.stamp - depth.images[depth.images.size() - 41]->header.stamp).toSec();
   EXPECT_NEAR(span_s, 40.0 / 30.0, 0.1);
@@ -121,7 +123,8 @@ TEST_F(OpenNI2Camera, CameraInfoHasTheImagesStampAndTheFieldOfViewsFocalLength) 
   std::vector<sensor_msgs::CameraInfoConstPtr> infos;
   Listener depth(node_, "camera/depth/image_raw");
   auto subscriber = node_.subscribe<sensor_msgs::CameraInfo>(
-      "camera/depth/camera_info", 100, [&](const sensor_msgs::CameraInfoConstPtr& info) { infos.push_back(info); });
+      "camera/depth/camera_info", 100,
+      [&](const sensor_msgs::CameraInfoConstPtr& info) { infos.push_back(info); });
   const auto paired = [&] {
     for (const auto& image : depth.images) {
       if (!infos.empty() && image->header.stamp == infos.back()->header.stamp) return true;

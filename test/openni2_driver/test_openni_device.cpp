@@ -1,4 +1,5 @@
-// The real OpenNI2 runtime on the virtual device. Run by ctest, which puts the plugin's folder on LD_LIBRARY_PATH.
+// The real OpenNI2 runtime on the virtual device. Run by ctest, which puts the plugin's folder on
+// LD_LIBRARY_PATH.
 
 #include <gmock/gmock.h>
 
@@ -31,7 +32,8 @@ TEST_F(VirtualDeviceTest, DepthArrivesExactly) {
   for (const auto& image : images) {
     ASSERT_EQ(image.width_px, 640);
     ASSERT_EQ(image.height_px, 480);
-    EXPECT_EQ(knav::wrong_pixels(image.pixels, static_cast<uint64_t>(image.index), VirtualCamera{640, 480}), 0);
+    EXPECT_EQ(knav::wrong_pixels(image.pixels, static_cast<uint64_t>(image.index), VirtualCamera{640, 480}),
+              0);
     EXPECT_EQ(image.device_time_us, 5000000U + static_cast<uint64_t>(std::llround(image.index * 1e6 / 30.0)));
     EXPECT_NEAR(320.0 / std::tan(0.5 * image.horizontal_fov_rad), 585.0, 1e-3);
   }

@@ -45,7 +45,8 @@ TEST(SensorFrame, TenthsOfMillimetresAreRounded) {
 }
 
 TEST(NominalModel, FollowsTheFieldsOfView) {
-  const knav::PinholeModel model = knav::nominal_model(640, 480, 2.0 * std::atan(320.0 / 585.0), 2.0 * std::atan(0.5));
+  const knav::PinholeModel model =
+      knav::nominal_model(640, 480, 2.0 * std::atan(320.0 / 585.0), 2.0 * std::atan(0.5));
   EXPECT_NEAR(model.fx_px, 585.0, 1e-9);
   EXPECT_NEAR(model.fy_px, 480.0, 1e-9);
   EXPECT_EQ(model.cx_px, 319.5);

@@ -61,11 +61,12 @@ class WatchedDevice {
 
   explicit WatchedDevice(const OpenNIDeviceConfig& config, bool keep_images = false)
       : keep_images_(keep_images),
-        device(config, [this](const SensorFrame& frame) { take(frame); },
-               [this](bool fault, const std::string& sentence) {
-                 std::lock_guard<std::mutex> lock(mutex_);
-                 (fault ? faults_ : news_).push_back(sentence);
-               }) {}
+        device(
+            config, [this](const SensorFrame& frame) { take(frame); },
+            [this](bool fault, const std::string& sentence) {
+              std::lock_guard<std::mutex> lock(mutex_);
+              (fault ? faults_ : news_).push_back(sentence);
+            }) {}
 
   int frames(SensorStream stream = SensorStream::kDepth) const {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -89,7 +90,13 @@ class WatchedDevice {
 
  private:
   void take(const SensorFrame& frame) {
-    Image image{frame.stream, frame.index, frame.width_px, frame.height_px, frame.device_time_us, frame.horizontal_fov_rad, {}};
+    Image image{frame.stream,
+                frame.index,
+                frame.width_px,
+                frame.height_px,
+                frame.device_time_us,
+                frame.horizontal_fov_rad,
+                {}};
     if (keep_images_) {
       image.pixels.resize(static_cast<std::size_t>(frame.width_px * frame.height_px));
       copy_pixels(frame, image.pixels.data());
