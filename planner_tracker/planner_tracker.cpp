@@ -146,12 +146,16 @@ Command PlannerTracker::State::step(double now_s, const RobotState& robot) {
   if (jumped) {
     odometry.clear();
     scan.clear();
+    scan_fresh = odometry_fresh = pose_fresh = {};
     if (has_goal) {
       fail(FailureCode::kNoSensorData, {robot.T_map_base.x_m, robot.T_map_base.y_m},
            "The clock jumped back; the goal was given up.");
       return command;
     }
   }
+  scan_fresh.note(scan.stamp_s(), now_s);
+  odometry_fresh.note(robot.odom_stamp_s, now_s);
+  pose_fresh.note(robot.pose_stamp_s, now_s);
   if (robot.odom_stamp_s > 0.0) odometry.add(robot.odom_stamp_s, robot.T_odom_base);
   if (!has_goal) {
     command = {};

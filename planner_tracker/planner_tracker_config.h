@@ -93,18 +93,20 @@ struct RecoveryConfig {
   }
 };
 
-/// Data older than this stops the robot.
+/// Silence stops the robot, and so does data that comes late.
 struct FreshnessConfig {
   double scan_s = 0.25;
   double pose_s = 0.25;
   double localization_s = 3.0;
+  double latency_s = 0.5;
   double give_up_s = 15.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.number("scan_s", scan_s, 0.05, 10, "s", "A scan_360 older than this stops the robot.");
-    v.number("pose_s", pose_s, 0.05, 10, "s", "So does odometry or a pose (TF map -> base_link) older than this,");
+    v.number("scan_s", scan_s, 0.05, 10, "s", "No new scan_360 for this long stops the robot.");
+    v.number("pose_s", pose_s, 0.05, 10, "s", "So does no new odometry or pose (TF map -> base_link) for this long,");
     v.number("localization_s", localization_s, 0.1, 60, "s", "and a localizer silent for this long, once it spoke.");
+    v.number("latency_s", latency_s, 0.05, 10, "s", "Scans, odometry and poses whose stamps are older than this stop it too.");
     v.number("give_up_s", give_up_s, 0.1, 600, "s", "Stopped by missing data for this long, the goal fails.");
   }
 };

@@ -12,6 +12,22 @@
 
 namespace knav {
 
+/// When a stream of stamped data last brought something new.
+class Freshness {
+ public:
+  void note(double stamp_s, double now_s) {
+    if (stamp_s == stamp_s_ && changed_s_ <= now_s) return;
+    stamp_s_ = stamp_s;
+    changed_s_ = now_s;
+  }
+  bool stale(double now_s, double silence_s, double latency_s) const {
+    return now_s - changed_s_ > silence_s || now_s - stamp_s_ > latency_s;
+  }
+
+ private:
+  double stamp_s_ = -1e9, changed_s_ = -1e9;
+};
+
 /// The inside of PlannerTracker: one step is a chain of questions, the first that has an answer commands.
 struct PlannerTracker::State {
   explicit State(const PlannerTrackerConfig& c);
@@ -44,6 +60,7 @@ struct PlannerTracker::State {
   RandomMoves moves;
   ScanView scan;
   PoseBuffer odometry{512};
+  Freshness scan_fresh, odometry_fresh, pose_fresh;
   GoalWatch watch;
 
   bool has_goal = false, ending = false;

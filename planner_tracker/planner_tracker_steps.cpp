@@ -19,16 +19,16 @@ Point2 position(const Pose2& pose) { return {pose.x_m, pose.y_m}; }
 
 bool PlannerTracker::State::stopped_by_missing_data(double now_s, const RobotState& robot) {
   const FreshnessConfig& f = config.freshness;
-  const auto stale = [&](double stamp_s, double limit_s) { return now_s - stamp_s > limit_s; };
+  const auto stale = [&](const Freshness& data, double limit_s) { return data.stale(now_s, limit_s, f.latency_s); };
   const char* why = nullptr;
   if (map.empty()) why = "There is no map yet.";
   else if (scan.empty()) why = "No scan_360 came yet; is the local mapper running?";
-  else if (stale(scan.stamp_s(), f.scan_s)) why = "The last scan_360 is too old; the camera or the local mapper stopped.";
-  else if (stale(robot.odom_stamp_s, f.pose_s)) why = "The last odometry is too old; the base stopped sending it.";
+  else if (stale(scan_fresh, f.scan_s)) why = "The last scan_360 is too old; the camera or the local mapper stopped.";
+  else if (stale(odometry_fresh, f.pose_s)) why = "The last odometry is too old; the base stopped sending it.";
   else if (!robot.has_pose) why = "There is no transform from the map to the robot; is the localizer running?";
-  else if (stale(robot.pose_stamp_s, f.pose_s)) why = "The transform from the map to the robot is too old; the localizer stopped.";
+  else if (stale(pose_fresh, f.pose_s)) why = "The transform from the map to the robot is too old; the localizer stopped.";
   else if (!is_finite(robot.T_map_base) || !is_finite(robot.T_odom_base)) why = "The robot's pose is not finite.";
-  else if (robot.localization != LocalizationState::kUnknown && stale(robot.localization_stamp_s, f.localization_s)) {
+  else if (robot.localization != LocalizationState::kUnknown && now_s - robot.localization_stamp_s > f.localization_s) {
     why = "The localizer fell silent.";
   } else if (robot.localization == LocalizationState::kInitializing) why = "The localizer has not started yet; give it an initial pose.";
   if (why == nullptr) {

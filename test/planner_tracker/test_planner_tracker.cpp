@@ -300,10 +300,10 @@ TEST(Safety, StaleOdometryPoseOrLocalizerStopEachWithItsOwnReason) {
     EXPECT_THAT(planner.explanation(), HasSubstr(word));
   };
   RobotState s = at(t += 0.05);
-  s.odom_stamp_s -= 0.3;
+  s.odom_stamp_s -= 0.6;
   expect_stop(s, "odometry");
   s = at(t += 0.05);
-  s.pose_stamp_s -= 0.3;
+  s.pose_stamp_s -= 0.6;
   expect_stop(s, "transform");
   s = at(t += 0.05);
   s.localization_stamp_s -= 3.5;
