@@ -4,6 +4,7 @@
 #include <ros/ros.h>
 #include <rosbag/bag.h>
 #include <sensor_msgs/Image.h>
+#include <tf2_msgs/TFMessage.h>
 #include <topic_tools/shape_shifter.h>
 
 #include <cstdio>
@@ -35,10 +36,12 @@ class MappingRecorderNodelet : public NodeletBase {
       throw UserError(config_.bag + ": cannot be written (" + error.what() + ").");
     }
     open_ = true;
-    for (const char* topic : {"depth_profile", "odom", "tf", "tf_static", "mark_place", "ground_truth", "joy",
+    for (const char* topic : {"depth_profile", "odom", "/tf", "mark_place", "ground_truth", "joy",
                               "camera/depth/camera_info"}) {
-      subscribe(topic);
+      subscribe<topic_tools::ShapeShifter>(topic);
     }
+    // By its type: a latched message of this very process does not reach a ShapeShifter.
+    subscribe<tf2_msgs::TFMessage>("/tf_static");
     if (config_.depth_s > 0.0) {
       depth_subscriber_ = getNodeHandle().subscribe<sensor_msgs::Image>(
           "camera/depth/image_raw", 60, [this](const sensor_msgs::ImageConstPtr& image) { add_depth(image); });
@@ -46,12 +49,11 @@ class MappingRecorderNodelet : public NodeletBase {
     NODELET_INFO("Recording to %s.", config_.bag.c_str());
   }
 
+  template <class Message>
   void subscribe(const std::string& topic) {
-    // tf is the root's whatever the namespace, as tf2 has it.
-    const std::string resolved =
-        topic == "tf" || topic == "tf_static" ? "/" + topic : getNodeHandle().resolveName(topic);
-    using Event = ros::MessageEvent<topic_tools::ShapeShifter const>;
-    subscribers_.push_back(getNodeHandle().subscribe<topic_tools::ShapeShifter>(
+    const std::string resolved = getNodeHandle().resolveName(topic);
+    using Event = ros::MessageEvent<Message const>;
+    subscribers_.push_back(getNodeHandle().subscribe<Message>(
         resolved, 1000, boost::function<void(const Event&)>([this, resolved](const Event& event) {
           write(resolved, event.getReceiptTime(), *event.getConstMessage(), event.getConnectionHeaderPtr());
         })));

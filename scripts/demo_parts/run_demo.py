@@ -170,8 +170,8 @@ class Demo:
     def build_map(self):
         self.line.show("building the map")
         start = time.monotonic()
-        arguments = ["build_map", self.out / "mapping.bag", "--out", self.map, "--config",
-                     ROOT / "config" / "default.yaml", "--from", "profile", "--json", self.out / "build_map.json"]
+        arguments = ["build_map", self.out / "mapping.bag", "--out", self.map, "--from", "profile", "--json",
+                     self.out / "build_map.json"]
         self.program(*arguments)
         mapping = recordings.Recording(self.out / "mapping.bag")
         truth = self.out / "mapping_truth.tum"
@@ -189,6 +189,7 @@ class Demo:
         from kinect_nav.msg import LocalizationStatus
         self.start("simulation_navigation", *self.simulation(people=True))
         state = self.watch_robot()
+        self.wait_for(lambda: state["frames"] > 5, 60, "the simulated robot's first estimates (motion_estimate)")
         self.start("navigation", "roslaunch", "kinect_nav", "navigation.launch", f"map:={self.map}",
                    "initial_pose_known:=true")
         rates = Rates("localization_status", LocalizationStatus)
