@@ -162,10 +162,27 @@ bool ClosureFinder::add(Closure closure, const Pose2& prior) {
     closure.match.T_from_to = edge.T_from_to;
     closure.match.information = edge.information;
   }
-  closure.accepted = true;
-  closures_.push_back(closure);
-  graph_.edges.push_back(edge);
-  return true;
+  return join(std::move(closure), edge);
+}
+
+/// Takes a closure in if the drive can bend so far: the growth of the optimum's chi2 is the closure's squared
+/// distance in standard deviations, given all that is known (its innovation).
+bool ClosureFinder::join(Closure closure, const PoseGraphEdge& edge) {
+  PoseGraph trial = graph_;
+  trial.edges.push_back(edge);
+  GraphOptimizerConfig plain = config_.graph;
+  plain.robust_loss = "none";
+  plain.initialization = "given";
+  optimize(plain, &trial);
+  closure.chi2 = chi2(trial) - chi2(graph_);
+  closure.accepted = closure.chi2 < config_.closures.max_innovation;
+  if (closure.accepted) {
+    graph_ = std::move(trial);
+  } else {
+    closure.reason = fmt::format("the drive would have to bend too much (chi2 grows by {:.0f})", closure.chi2);
+  }
+  closures_.push_back(std::move(closure));
+  return closures_.back().accepted;
 }
 
 void ClosureFinder::pair_buttons() {
@@ -192,12 +209,11 @@ void ClosureFinder::pair_buttons() {
     closure.from = nearest;
     closure.to = marks[b];
     closure.source = "button";
-    if (add(closure, graph_.nodes.at(nearest).inverse() * graph_.nodes.at(marks[b]))) optimize_all();
+    add(closure, graph_.nodes.at(nearest).inverse() * graph_.nodes.at(marks[b]));
   }
 }
 
 void ClosureFinder::search_from(int keyframe) {
-  bool found = false;
   for (const int visit : earlier_visits(keyframe)) {
     const Pose2 prior = graph_.nodes.at(visit).inverse() * graph_.nodes.at(keyframe);
     const double radius_m = window_for(drift_path_m(visit, keyframe)).radius_m;
@@ -209,16 +225,16 @@ void ClosureFinder::search_from(int keyframe) {
     closure.from = visit;
     closure.to = keyframe;
     closure.source = "automatic";
-    found = add(closure, prior) || found;
+    add(closure, prior);
   }
-  if (found) optimize_all();
 }
 
 void ClosureFinder::optimize_all() { summary_ = optimize(config_.graph, &graph_); }
 
 /// Closures that the graph as a whole contradicts are taken out, the worst first.
 void ClosureFinder::settle() {
-  if (closures_.empty()) return;
+  const bool any = std::any_of(closures_.begin(), closures_.end(), [](const Closure& c) { return c.accepted; });
+  if (!any) return;
   optimize_all();
   const double limit = 4.0 * config_.graph.robust_scale * config_.graph.robust_scale;
   while (true) {

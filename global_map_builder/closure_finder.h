@@ -45,6 +45,7 @@ class ClosureFinder {
   MatchWindow window_for(double path_m) const;
   bool tried(int from, int to, const Pose2& T_from_to) const;
   bool add(Closure closure, const Pose2& prior);
+  bool join(Closure closure, const PoseGraphEdge& edge);
   void optimize_all();
   void settle();
 

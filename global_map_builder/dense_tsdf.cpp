@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/multiversion.h"
+
 namespace knav {
 namespace {
 
@@ -29,6 +31,57 @@ bool row_span(const TsdfObservation& o, float cos_yaw, float sin_yaw, double dy,
   clip(-(sin_yaw - cos_yaw * right_slope), (cos_yaw + sin_yaw * right_slope) * dy);
   clip(sin_yaw - cos_yaw * left_slope, -(cos_yaw + sin_yaw * left_slope) * dy);
   return *low <= *high;
+}
+
+constexpr int kChunk = 256;
+
+/// Which column of the observation sees each cell of a row, -1 for none, and the cells' squared distances.
+struct RowProjection {
+  float cos_yaw, sin_yaw;      ///< of the sensor
+  float first_dx, dy;          ///< of the first cell's centre from the sensor
+  float resolution;
+  float column_scale, column_shift, columns;
+};
+
+KNAV_MULTIVERSION
+void project_pinhole(const RowProjection& p, int count, std::int32_t* column, float* square) {
+  for (int n = 0; n < count; ++n) {
+    const float dx = p.first_dx + p.resolution * static_cast<float>(n);
+    const float forward = p.cos_yaw * dx + p.sin_yaw * p.dy;
+    const float right = p.sin_yaw * dx - p.cos_yaw * p.dy;
+    float u = p.column_shift + p.column_scale * right / (forward > 1e-3f ? forward : 1e-3f);
+    u = u < -1.0f ? -1.0f : u;
+    u = u > p.columns ? p.columns : u;
+    column[n] = forward > 1e-3f && u >= 0.0f && u < p.columns ? static_cast<std::int32_t>(u) : -1;
+    square[n] = dx * dx + p.dy * p.dy;
+  }
+}
+
+/// atan2 to 1e-5 rad, as in core/tsdf_grid.cpp: the same bytes on every target.
+inline float angle_of(float y, float x) {
+  const float ax = std::fabs(x), ay = std::fabs(y);
+  const float high = ax > ay ? ax : ay, low = ax > ay ? ay : ax;
+  const float t = low / (high > 1e-12f ? high : 1e-12f), t2 = t * t;
+  float a = ((((-0.0117212f * t2 + 0.05265332f) * t2 - 0.11643287f) * t2 + 0.19354346f) * t2 - 0.33262347f) * t2;
+  a = (a + 0.99997726f) * t;
+  a = ay > ax ? 1.57079632679f - a : a;
+  a = x < 0.0f ? 3.14159265359f - a : a;
+  return y < 0.0f ? -a : a;
+}
+
+KNAV_MULTIVERSION
+void project_angular(const RowProjection& p, int count, std::int32_t* column, float* square) {
+  const float turn = 6.28318530718f * std::fabs(p.column_scale);
+  for (int n = 0; n < count; ++n) {
+    const float dx = p.first_dx + p.resolution * static_cast<float>(n);
+    const float x = p.cos_yaw * dx + p.sin_yaw * p.dy, y = p.cos_yaw * p.dy - p.sin_yaw * dx;
+    float u = p.column_shift + p.column_scale * angle_of(y, x);
+    u = u < 0.0f ? u + turn : u;  // a scan may start anywhere on the circle
+    u = u >= turn ? u - turn : u;
+    const float bounded = u < p.columns ? u : p.columns;
+    column[n] = bounded >= 0.0f && bounded < p.columns ? static_cast<std::int32_t>(bounded) : -1;
+    square[n] = dx * dx + p.dy * p.dy;
+  }
 }
 
 }  // namespace
@@ -70,41 +123,50 @@ void DenseTsdf::add(const TsdfObservation& o, int first_row, int last_row) {
 }
 
 void DenseTsdf::add_row(const TsdfObservation& o, int iy, int from, int to) {
-  const auto c = static_cast<float>(std::cos(o.T_map_sensor.yaw_rad));
-  const auto s = static_cast<float>(std::sin(o.T_map_sensor.yaw_rad));
-  const auto dy = static_cast<float>(geometry_.center_y_m(iy) - o.T_map_sensor.y_m);
-  const auto columns = static_cast<float>(o.columns());
+  RowProjection p;
+  p.cos_yaw = static_cast<float>(std::cos(o.T_map_sensor.yaw_rad));
+  p.sin_yaw = static_cast<float>(std::sin(o.T_map_sensor.yaw_rad));
+  p.dy = static_cast<float>(geometry_.center_y_m(iy) - o.T_map_sensor.y_m);
+  p.resolution = static_cast<float>(geometry_.resolution_m);
+  p.columns = static_cast<float>(o.columns());
+  if (o.pinhole) {
+    p.column_scale = o.fx_px;
+    p.column_shift = o.cx_px + 0.5f;
+  } else {
+    p.column_scale = 1.0f / o.angle_increment_rad;
+    p.column_shift = 0.5f - o.angle_min_rad / o.angle_increment_rad;
+  }
+  std::int32_t column[kChunk];
+  float square[kChunk];
+  for (int start = from; start < to; start += kChunk) {
+    const int count = std::min(kChunk, to - start);
+    p.first_dx = static_cast<float>(geometry_.center_x_m(start) - o.T_map_sensor.x_m);
+    (o.pinhole ? project_pinhole : project_angular)(p, count, column, square);
+    update(o, geometry_.index(start, iy), count, column, square);
+  }
+}
+
+void DenseTsdf::update(const TsdfObservation& o, std::size_t first, int count, const std::int32_t* column,
+                       const float* square) {
   const auto front = static_cast<float>(config_.front_m);
   const auto behind_base = static_cast<float>(config_.behind_m - config_.front_m);  // added to the column's mu
-  const auto floor_m = static_cast<float>(config_.weight_range_floor_m);
+  const auto floor2 = static_cast<float>(config_.weight_range_floor_m * config_.weight_range_floor_m);
   const auto power = static_cast<float>(-config_.weight_power / 2.0);
   const bool fourth = config_.weight_power == 4.0, second = config_.weight_power == 2.0;
-  for (int ix = from; ix < to; ++ix) {
-    const auto dx = static_cast<float>(geometry_.center_x_m(ix) - o.T_map_sensor.x_m);
-    const float forward = c * dx + s * dy, left = c * dy - s * dx;
-    float u;
-    if (o.pinhole) {
-      if (forward < 1e-3f) continue;
-      u = o.cx_px + 0.5f - o.fx_px * left / forward;
-    } else {
-      u = 0.5f + (std::atan2(left, forward) - o.angle_min_rad) / o.angle_increment_rad;
-      const float turn = 6.28318531f / std::fabs(o.angle_increment_rad);
-      if (u < 0.0f) u += turn;
-      if (u >= turn) u -= turn;
-    }
-    if (!(u >= 0.0f && u < columns)) continue;
-    const auto k = static_cast<std::size_t>(u);
-    const float square = dx * dx + dy * dy, d = std::sqrt(square);
+  for (int n = 0; n < count; ++n) {
+    if (column[n] < 0) continue;
+    const auto k = static_cast<std::size_t>(column[n]);
+    const float d = std::sqrt(square[n]);
     const float eta = o.range_m[k] - d;  // equation 3; NaN without a surface
     const float mu = o.truncation_m[k], behind = mu + behind_base;
     const bool near_surface = eta >= -behind && eta < mu;
     if (!near_surface && !(d >= o.free_from_m[k] && d <= o.free_to_m[k])) continue;
     const float value = near_surface ? std::min(eta, front) : front;  // equation 2, in metres
-    const float bounded = std::max(square, floor_m * floor_m);
+    const float bounded = std::max(square[n], floor2);
     float w = fourth ? 1.0f / (bounded * bounded) : second ? 1.0f / bounded : std::pow(bounded, power);
     // The far half of the support behind a surface fades out, so that it yields to what the other side shows.
     if (near_surface && eta < -0.5f * behind) w *= 2.0f * (1.0f + eta / behind) + 0.05f;
-    const std::size_t i = geometry_.index(ix, iy);
+    const std::size_t i = first + static_cast<std::size_t>(n);
     sum_[i] += w * value;
     weight_[i] += w;
     if (looks_[i] < 0xFFFF) ++looks_[i];

@@ -55,6 +55,8 @@ class DenseTsdf {
 
  private:
   void add_row(const TsdfObservation& observation, int iy, int from, int to);
+  void update(const TsdfObservation& observation, std::size_t first, int count, const std::int32_t* column,
+              const float* square);
 
   GridGeometry geometry_;
   SurfaceConfig config_;

@@ -56,6 +56,7 @@ struct ClosureConfig {
   double search_angle_max_deg = 40.0;
   double button_sd_m = 0.3;
   double nearest_m = 4.0;
+  double max_innovation = 40.0;
   int passes = 2;
   MatchConfig match;
 
@@ -76,6 +77,8 @@ struct ClosureConfig {
     v.number("search_angle_max_deg", search_angle_max_deg, 0, 180, "deg", "Likewise for the heading.");
     v.number("button_sd_m", button_sd_m, 0.01, 5, "m", "How well the robot is put back at a marked place (sd).");
     v.number("nearest_m", nearest_m, 0.1, 50, "m", "Local maps farther apart than this (and the search) are not compared.");
+    v.number("max_innovation", max_innovation, 1, 1e6, "",
+             "A closure that makes the graph's chi2 grow by more is refused: the drive cannot have been so wrong.");
     v.integer("passes", passes, 1, 5, "", "Passes over the drive; each starts from the graph that the last one left.");
     v.group("match", match, "When a match counts.");
   }

@@ -7,6 +7,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+
+#include "core/multiversion.h"
 
 namespace knav {
 namespace {
@@ -18,8 +21,9 @@ constexpr double kFineReach_m = 0.3;
 constexpr double kWaviness = 0.015;      // mean square of a contour's slope error
 constexpr double kInlier_m = 0.15;
 constexpr double kMinFacing = 0.7;  // cosine between two surfaces' normals
-constexpr std::size_t kCoarsePoints = 120;
+constexpr std::size_t kCoarsePoints = 120;  // at most 257, or the 16-bit sums overflow
 constexpr std::size_t kPeaks = 8;
+constexpr double kPeakShare = 0.6;
 
 struct Candidate {
   Pose2 pose;
@@ -38,7 +42,44 @@ std::vector<SurfacePoint> thin(const std::vector<SurfacePoint>& points, std::siz
   return out;
 }
 
-/// Every pose of the window on a lattice, scored by the nearest cell; the best of each neighbourhood.
+/// What a point scores in each coarse cell, 255 on a surface, 0 from kCoarseReach_m on; with a border of zeros.
+struct ScoreGrid {
+  int width = 0, height = 0;
+  double origin_x_m = 0.0, origin_y_m = 0.0;
+  std::vector<std::uint8_t> score;
+
+  ScoreGrid(const Submap& map, int border) {
+    const GridGeometry& g = map.geometry();
+    origin_x_m = g.origin_x_m - border * kCoarseStep_m;
+    origin_y_m = g.origin_y_m - border * kCoarseStep_m;
+    width = static_cast<int>(std::ceil(g.width_cells * g.resolution_m / kCoarseStep_m)) + 2 * border;
+    height = static_cast<int>(std::ceil(g.height_cells * g.resolution_m / kCoarseStep_m)) + 2 * border;
+    score.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    for (int iy = border; iy < height - border; ++iy) {
+      for (int ix = border; ix < width - border; ++ix) {
+        const auto x = static_cast<float>(origin_x_m + (ix + 0.5) * kCoarseStep_m);
+        const auto y = static_cast<float>(origin_y_m + (iy + 0.5) * kCoarseStep_m);
+        const float d = std::fabs(map.nearest(x, y, 1e3f));
+        if (d < kCoarseReach_m) score[at(ix, iy)] = static_cast<std::uint8_t>(255.0f * (1.0f - d / kCoarseReach_m));
+      }
+    }
+  }
+  std::size_t at(int ix, int iy) const {
+    return static_cast<std::size_t>(iy) * static_cast<std::size_t>(width) + static_cast<std::size_t>(ix);
+  }
+};
+
+/// Adds to every shift's sum what one point scores there: `side` x `side` shifts, `first` the lowest's cell.
+KNAV_MULTIVERSION
+void add_shifts(const std::uint8_t* first, int side, int width, std::uint16_t* sum) {
+  for (int iy = 0; iy < side; ++iy) {
+    const std::uint8_t* row = first + static_cast<std::ptrdiff_t>(iy) * width;
+    std::uint16_t* out = sum + static_cast<std::ptrdiff_t>(iy) * side;
+    for (int ix = 0; ix < side; ++ix) out[ix] = static_cast<std::uint16_t>(out[ix] + row[ix]);
+  }
+}
+
+/// Every pose of the window on a lattice, scored by the coarse cell of each point; the best of each neighbourhood.
 std::vector<Candidate> search(const MatchConfig& config, const Submap& from, const Submap& to, const Pose2& prior,
                               const MatchWindow& window) {
   const std::vector<SurfacePoint> points = thin(to.points(), kCoarsePoints);
@@ -46,26 +87,28 @@ std::vector<Candidate> search(const MatchConfig& config, const Submap& from, con
   for (const SurfacePoint& p : points) reach_m = std::max(reach_m, static_cast<double>(std::hypot(p.x_m, p.y_m)));
   const double angle_step = std::min(2.0 * kCoarseStep_m / reach_m, 0.06);
   const int turns = static_cast<int>(std::ceil(window.angle_rad / angle_step));
-  const int steps = static_cast<int>(std::ceil(window.radius_m / kCoarseStep_m));
+  const int steps = static_cast<int>(std::ceil(window.radius_m / kCoarseStep_m)), side = 2 * steps + 1;
+  const ScoreGrid grid(from, side);
   std::vector<Candidate> all;
-  std::vector<float> x(points.size()), y(points.size());
+  std::vector<std::uint16_t> sum(static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
+  double best = 0.0;
   for (int turn = -turns; turn <= turns; ++turn) {
-    const double yaw = prior.yaw_rad + turn * angle_step;
-    const auto c = static_cast<float>(std::cos(yaw)), s = static_cast<float>(std::sin(yaw));
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      x[i] = c * points[i].x_m - s * points[i].y_m;
-      y[i] = s * points[i].x_m + c * points[i].y_m;
+    const double yaw = prior.yaw_rad + turn * angle_step, c = std::cos(yaw), s = std::sin(yaw);
+    std::fill(sum.begin(), sum.end(), std::uint16_t{0});
+    for (const SurfacePoint& p : points) {
+      const double x = prior.x_m + c * p.x_m - s * p.y_m, y = prior.y_m + s * p.x_m + c * p.y_m;
+      const int ix = static_cast<int>(std::floor((x - grid.origin_x_m) / kCoarseStep_m)) - steps;
+      const int iy = static_cast<int>(std::floor((y - grid.origin_y_m) / kCoarseStep_m)) - steps;
+      if (ix < 0 || iy < 0 || ix + side > grid.width || iy + side > grid.height) continue;  // never near a surface
+      add_shifts(&grid.score[grid.at(ix, iy)], side, grid.width, sum.data());
     }
     for (int iy = -steps; iy <= steps; ++iy) {
       for (int ix = -steps; ix <= steps; ++ix) {
-        if (ix * ix + iy * iy > steps * steps) continue;
-        const double px = prior.x_m + ix * kCoarseStep_m, py = prior.y_m + iy * kCoarseStep_m;
-        float sum = 0.0f;
-        for (std::size_t i = 0; i < points.size(); ++i) {
-          const float d = std::fabs(from.nearest(x[i] + static_cast<float>(px), y[i] + static_cast<float>(py), 1e3f));
-          if (d < kCoarseReach_m) sum += 1.0f - d / kCoarseReach_m;
-        }
-        all.push_back({{px, py, normalize_angle_rad(yaw)}, sum / static_cast<double>(points.size())});
+        const auto i = static_cast<std::size_t>((iy + steps) * side + ix + steps);
+        const double score = sum[i] / (255.0 * static_cast<double>(points.size()));
+        if (score < kPeakShare * best || ix * ix + iy * iy > steps * steps) continue;
+        best = std::max(best, score);
+        all.push_back({{prior.x_m + ix * kCoarseStep_m, prior.y_m + iy * kCoarseStep_m, normalize_angle_rad(yaw)}, score});
       }
     }
   }
@@ -75,7 +118,7 @@ std::vector<Candidate> search(const MatchConfig& config, const Submap& from, con
   });
   std::vector<Candidate> peaks;
   for (const Candidate& candidate : all) {
-    if (peaks.size() == kPeaks || candidate.score < 0.6 * all.front().score) break;
+    if (peaks.size() == kPeaks || candidate.score < kPeakShare * best) break;
     const bool taken = std::any_of(peaks.begin(), peaks.end(),
                                    [&](const Candidate& peak) { return same_place(config, peak.pose, candidate.pose); });
     if (!taken) peaks.push_back(candidate);

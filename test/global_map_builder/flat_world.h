@@ -105,14 +105,14 @@ inline std::vector<Pose2> drive_through(const std::vector<Point2>& points) {
   return poses;
 }
 
-/// Odometry that drifts: every metre reads 3 % long and turns by 1.5 deg that were not driven.
+/// Odometry that drifts: every metre reads 1 % long and turns by 1 deg that were not driven.
 inline std::vector<Pose2> drifting_odometry(const std::vector<Pose2>& truth) {
   std::vector<Pose2> odometry = {{5.0, -3.0, 1.0}};  // its origin is anywhere
   for (std::size_t i = 1; i < truth.size(); ++i) {
     Pose2 step = truth[i - 1].inverse() * truth[i];
     const double length = std::hypot(step.x_m, step.y_m);
-    step.x_m *= 1.03;
-    step.yaw_rad += 0.026 * length;
+    step.x_m *= 1.01;
+    step.yaw_rad += 0.0175 * length;
     odometry.push_back(odometry.back() * step);
   }
   return odometry;

@@ -94,9 +94,9 @@ TEST(MapBuilder, ClosesALoopOfDriftingOdometryByItself) {
   const BuiltMap built = builder.build();
   const auto accepted = std::count_if(built.closures.begin(), built.closures.end(), [](const Closure& c) { return c.accepted; });
   EXPECT_GE(accepted, 1);
-  EXPECT_LT(final_error_m(drive, built), 0.10);
+  EXPECT_LT(final_error_m(drive, built), 0.15);
   EXPECT_LT(contour_rmse_m(drive, built.contour), 0.06);
-  EXPECT_GT(completeness(built.contour), 0.97);
+  EXPECT_GT(completeness(built.contour), 0.9);
   EXPECT_EQ(built.map.trajectory.size(), drive.truth.size());
   EXPECT_NEAR(distance_m(built.map.trajectory.front().T_map_robot, Pose2{}), 0.0, 1e-9) << "the start is the origin";
 
