@@ -156,7 +156,8 @@ class Loader {
     bag.require_topic(options_.range_topic);
     const std::vector<RangeReading> readings = read_ranges(bag);
     Progress progress(stage);
-    int used = 0;
+    int used = 0, skipped = 0;
+    std::string why;
     bag.for_each({options_.depth_topic, options_.info_topic},
                  [&](const rosbag::MessageInstance& message, double done) {
                    if (const auto info = message.instantiate<sensor_msgs::CameraInfo>()) {
@@ -165,18 +166,28 @@ class Loader {
                      double range_m = 0.0;
                      if (!stands_still(readings, message.getTime().toSec(), &range_m)) return;
                      const auto image = message.instantiate<sensor_msgs::Image>();
-                     if (!image) throw UserError(path + ": topic '" + options_.depth_topic + "' holds no images.");
+                     if (!image)
+                       throw UserError(path + ": topic '" + options_.depth_topic + "' holds no images.");
                      cv::Mat view;
                      std::string fault;
                      if (!view_depth(*image, &view, &fault)) throw UserError(path + ": " + fault);
-                     add(path, view, range_m, calibrator);
-                     progress.update(done, fmt::format("{} frames", ++used));
+                     try {
+                       add(path, view, range_m, calibrator);
+                       ++used;
+                     } catch (const UserError& error) {  // it stood somewhere else for a while
+                       ++skipped;
+                       why = error.what();
+                     }
+                     progress.update(done, fmt::format("{} frames", used));
                    }
                  });
+    if (skipped > 0)
+      fmt::print(stderr, "calibrate_depth: {} frames left out, the last because {}\n", skipped, why);
     if (used == 0) {
-      throw UserError(fmt::format(
-          "{}: no depth image was taken with the robot standing still (a steady '{}' for {} s before and after).", path,
-          options_.range_topic, kStillFor_s));
+      throw UserError(
+          fmt::format("{}: no depth image was taken with the robot standing still (a steady '{}' for {} s "
+                      "before and after).",
+                      path, options_.range_topic, kStillFor_s));
     }
   }
 
@@ -188,14 +199,15 @@ class Loader {
     std::vector<RangeReading> readings;
     bag.for_each({options_.range_topic}, [&](const rosbag::MessageInstance& message, double) {
       const auto range = message.instantiate<sensor_msgs::Range>();
-      if (!range) throw UserError(bag.path() + ": topic '" + options_.range_topic + "' holds no sensor_msgs/Range.");
+      if (!range)
+        throw UserError(bag.path() + ": topic '" + options_.range_topic + "' holds no sensor_msgs/Range.");
       readings.push_back({message.getTime().toSec(), range->range + options_.range_offset_m});
     });
     return readings;
   }
 
-  /// Frames taken while the robot drives or turns to its next distance show no wall squarely: only those count round
-  /// which the range finder is steady, and their distance is its mean.
+  /// Frames taken while the robot drives or turns to its next distance show no wall squarely: only those
+  /// count round which the range finder is steady, and their distance is its mean.
   static bool stands_still(const std::vector<RangeReading>& readings, double stamp_s, double* range_m) {
     auto reading = std::lower_bound(readings.begin(), readings.end(), stamp_s - kStillFor_s,
                                     [](const RangeReading& r, double s) { return r.stamp_s < s; });

@@ -60,6 +60,8 @@ void DepthCalibrator::add_frame(const cv::Mat& depth_m, const PinholeModel& came
   }
   if (config_.deband) debander_.remove_bands(&frame_);
 
+  average_tiles();
+  keep_wall_tiles(distance_m);
   const double same_m = std::max(0.01, 0.005 * distance_m);
   auto wall = std::find_if(walls_.begin(), walls_.end(),
                            [&](const Wall& w) { return std::abs(w.distance_m - distance_m) <= same_m; });
@@ -69,8 +71,19 @@ void DepthCalibrator::add_frame(const cv::Mat& depth_m, const PinholeModel& came
     wall->inverse_per_m.assign(layout_.tile_count(), 0.0);
     wall->count.assign(layout_.tile_count(), 0.0);
   }
+  for (std::size_t tile = 0; tile < layout_.tile_count(); ++tile) {
+    if (std::isnan(frame_per_m_[tile])) continue;
+    wall->inverse_per_m[tile] += frame_per_m_[tile];
+    wall->count[tile] += 1.0;
+  }
+  wall->distance_m = (wall->distance_m * wall->frames + distance_m) / (wall->frames + 1);
+  ++wall->frames;
+}
+
+/// frame_ -> frame_per_m_: each tile's mean inverse depth, NaN where too little answered.
+void DepthCalibrator::average_tiles() {
+  frame_per_m_.assign(layout_.tile_count(), std::numeric_limits<double>::quiet_NaN());
   std::vector<double> values;
-  int seen = 0;
   for (int r = 0; r < layout_.rows(); ++r) {
     for (int c = 0; c < layout_.columns(); ++c) {
       values.clear();
@@ -80,7 +93,7 @@ void DepthCalibrator::add_frame(const cv::Mat& depth_m, const PinholeModel& came
           if (z > 0.0f) values.push_back(1.0 / z);
         }
       }
-      if (values.size() < static_cast<std::size_t>(config_.tile_px * config_.tile_px) / 4) continue;
+      if (values.size() < static_cast<std::size_t>(config_.tile_px * config_.tile_px) / 4 + 1) continue;
       // The mean near the median: a median alone would be rounded to a whole code.
       const double median = median_of(&values);
       double sum = 0.0, near = 0.0;
@@ -89,18 +102,52 @@ void DepthCalibrator::add_frame(const cv::Mat& depth_m, const PinholeModel& came
         sum += value;
         near += 1.0;
       }
-      const auto tile = static_cast<std::size_t>(r * layout_.columns() + c);
-      wall->inverse_per_m[tile] += sum / near;
-      wall->count[tile] += 1.0;
-      ++seen;
+      frame_per_m_[static_cast<std::size_t>(r * layout_.columns() + c)] = sum / near;
     }
   }
-  if (seen < static_cast<int>(layout_.tile_count()) / 4) {
-    throw UserError(fmt::format("the frame at {} m has depth in {} of {} tiles; the wall must fill the view.",
-                                distance_m, seen, layout_.tile_count()));
+}
+
+/// Takes out tiles that show floor, ceiling or something else than the wall. UserError if too few are left.
+void DepthCalibrator::keep_wall_tiles(double distance_m) {
+  Eigen::Vector3d plane(0.0, 0.0, 1.0 / distance_m);  // of inverse depth, in (x, y, 1)
+  const auto expected = [&](std::size_t tile) {
+    return plane[0] * tile_x_[tile] + plane[1] * tile_y_[tile] + plane[2];
+  };
+  int kept = 0;
+  for (const double tolerance : {0.2, 0.12, 0.08, 0.08}) {
+    Eigen::Matrix3d A = Eigen::Matrix3d::Identity() * 1e-9;
+    Eigen::Vector3d b = Eigen::Vector3d::Zero();
+    kept = 0;
+    for (std::size_t tile = 0; tile < layout_.tile_count(); ++tile) {
+      // What is an error in disparity is a larger share of the inverse depth the farther the wall.
+      const double most = tolerance * expected(tile) + 4.0 * kInverseDepthPerCode;
+      if (!(std::abs(frame_per_m_[tile] - expected(tile)) <= most)) continue;
+      const Eigen::Vector3d terms(tile_x_[tile], tile_y_[tile], 1.0);
+      A += terms * terms.transpose();
+      b += terms * frame_per_m_[tile];
+      ++kept;
+    }
+    if (kept < static_cast<int>(layout_.tile_count()) * 2 / 5) break;
+    plane = A.ldlt().solve(b);
   }
-  wall->distance_m = (wall->distance_m * wall->frames + distance_m) / (wall->frames + 1);
-  ++wall->frames;
+  if (kept < static_cast<int>(layout_.tile_count()) * 2 / 5) {
+    throw UserError(
+        fmt::format("the frame said to be {:.2f} m from a wall shows one in {} of {} tiles; the wall must "
+                    "fill most of the view, at that distance.",
+                    distance_m, kept, layout_.tile_count()));
+  }
+  const double tilt = plane.head<2>().norm() / plane[2];
+  if (tilt > 0.12) {
+    throw UserError(
+        fmt::format("the frame {:.2f} m from a wall is {:.0f} degrees off square; at most 7 will do.",
+                    distance_m, std::atan(tilt) * 180.0 / M_PI));
+  }
+  for (std::size_t tile = 0; tile < layout_.tile_count(); ++tile) {
+    const double most = 0.08 * expected(tile) + 4.0 * kInverseDepthPerCode;
+    if (!(std::abs(frame_per_m_[tile] - expected(tile)) <= most)) {
+      frame_per_m_[tile] = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
 }
 
 double DepthCalibrator::true_per_m(const Wall& wall, std::size_t tile) const {

@@ -15,7 +15,8 @@ struct DepthCalibratorConfig {
   bool deband = true;
   bool fit_wall_tilt = true;  ///< the robot may stand a degree off square
   double range_finder_sd_m = 0.002;
-  /// Only readings within this share of the distance, growing with it as the sensor's error does, are the wall's.
+  /// Only readings within this share of the distance, growing with it as the sensor's error does, are the
+  /// wall's.
   double wall_gate = 0.03, wall_gate_per_m = 0.02;
   double sensor_sd_per_m = 3e-4;  ///< of a tile's mean in inverse depth, once noise is averaged away
 };
@@ -60,6 +61,8 @@ class DepthCalibrator {
     bool has(std::size_t tile) const { return count[tile] > 0.0; }
     double measured_per_m(std::size_t tile) const { return inverse_per_m[tile] / count[tile]; }
   };
+  void average_tiles();
+  void keep_wall_tiles(double distance_m);
   double true_per_m(const Wall& wall, std::size_t tile) const;
   double weight(const Wall& wall) const;
   void fit_scale_and_tilts(DepthCalibration* calibration);
@@ -74,6 +77,7 @@ class DepthCalibrator {
   std::vector<Wall> walls_;
   Debander debander_;
   cv::Mat frame_;
+  std::vector<double> frame_per_m_;  // per tile
   bool offsets_known_ = false;
   int filled_tiles_ = 0;
 };

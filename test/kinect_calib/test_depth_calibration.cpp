@@ -127,6 +127,31 @@ TEST(DepthCalibration, BandsAndAWallThatIsNotSquareAreNotLearned) {
   EXPECT_LE(bias.tile_p95, 0.025);
 }
 
+TEST(DepthCalibration, TheFloorBeforeTheWallIsNotLearned) {
+  // A camera 0.5 m up sees floor from 1.22 m on: the lower rows show wall from near only.
+  DepthCalibrator calibrator{DepthCalibratorConfig{}};
+  std::uint64_t seed = 1;
+  for (double d = 0.5; d <= 4.0; d *= 1.15) {
+    cv::Mat view = wall(d, ++seed, {});
+    for (int v = 241; v < 480; ++v) {
+      const double floor_m = 0.5 * 585.0 / (v - 239.5);
+      if (floor_m < d) view.row(v).setTo(static_cast<float>(floor_m));
+    }
+    calibrator.add_frame(view, kCamera, d);
+  }
+  const Bias bias = bias_at(DepthCorrectionConfig{}, calibrator.fit(), 10.0);
+  EXPECT_LE(std::abs(bias.mean), 0.01);
+  EXPECT_LE(bias.tile_p95, 0.02);
+}
+
+TEST(DepthCalibration, AFrameThatShowsNoSquareWallIsRefused) {
+  DepthCalibrator calibrator{DepthCalibratorConfig{}};
+  WallView slanted;
+  slanted.tilt_x = 0.2;
+  EXPECT_THROW(calibrator.add_frame(wall(1.0, 1, slanted), kCamera, 1.0), UserError);
+  EXPECT_THROW(calibrator.add_frame(wall(1.0, 1, {}), kCamera, 2.0), UserError) << "not at that distance";
+}
+
 TEST(Debander, RemovesStepsAndKeepsTheSmoothError) {
   WallView banded;
   banded.band_codes = 0.4;
