@@ -171,7 +171,8 @@ class ObservationReader::Impl {
     });
     FixedTransforms transforms;
     const auto add = [&](const rosbag::MessageInstance& message) {
-      for (const auto& transform : instantiate<tf2_msgs::TFMessage>(message)->transforms) transforms.add(transform);
+      const auto tf = instantiate<tf2_msgs::TFMessage>(message);
+      for (const auto& transform : tf->transforms) transforms.add(transform);
     };
     search({"tf_static"}, add);
     bool found = transforms.find(base_frame_, sensor, &T_base_sensor_);
