@@ -28,7 +28,10 @@ int MapLayer::squared_for(double clearance_m) const {
 }
 
 CombinedMap::CombinedMap(double reach_m, int occupied_threshold, int free_threshold)
-    : reach_m_(reach_m), occupied_threshold_(occupied_threshold), free_threshold_(free_threshold), distance_(1) {}
+    : reach_m_(reach_m),
+      occupied_threshold_(occupied_threshold),
+      free_threshold_(free_threshold),
+      distance_(1) {}
 
 CellState CombinedMap::local_state(std::int8_t value) const {
   if (value < 0) return CellState::kUnknown;
@@ -39,7 +42,8 @@ CellState CombinedMap::local_state(std::int8_t value) const {
 void CombinedMap::set_global(const DistanceMap& distance, const OccupancyGrid& occupancy,
                              const OccupancyGrid& keepout) {
   const bool has_distance = !distance.empty(), has_occupancy = !occupancy.value.empty();
-  if (!has_distance && !has_occupancy) throw UserError("map: neither an occupancy grid nor a distance map is given.");
+  if (!has_distance && !has_occupancy)
+    throw UserError("map: neither an occupancy grid nor a distance map is given.");
   const GridGeometry geometry = has_occupancy ? occupancy.geometry : distance.geometry;
   const std::size_t cells = geometry.cell_count();
   if (!(geometry.resolution_m > 0.0) || cells == 0) throw UserError("map: it has no cells or no resolution.");
@@ -50,7 +54,8 @@ void CombinedMap::set_global(const DistanceMap& distance, const OccupancyGrid& o
   if (!keepout.value.empty() && (!same_grid(keepout.geometry, geometry) || keepout.value.size() != cells)) {
     throw UserError("keepout map: its grid is not that of the map; give keepout.pgm the size of map.pgm.");
   }
-  const int reach_cells = std::clamp(static_cast<int>(std::ceil(reach_m_ / geometry.resolution_m + 0.5)), 1, 126);
+  const int reach_cells =
+      std::clamp(static_cast<int>(std::ceil(reach_m_ / geometry.resolution_m + 0.5)), 1, 126);
   distance_ = TruncatedDistance(reach_cells);
   global_.geometry = geometry;
   global_.reach_cells = reach_cells;
@@ -61,8 +66,10 @@ void CombinedMap::set_global(const DistanceMap& distance, const OccupancyGrid& o
     if (has_distance && state == CellState::kFree) {
       // The contour may cut a cell that the occupancy grid calls free: within half a cell it is occupied.
       const float d = distance.distance_m[i];
-      if (std::isnan(d)) state = CellState::kUnknown;
-      else if (has_occupancy ? d <= 0.0f : d < 0.5 * geometry.resolution_m) state = CellState::kOccupied;
+      if (std::isnan(d))
+        state = CellState::kUnknown;
+      else if (has_occupancy ? d <= 0.0f : d < 0.5 * geometry.resolution_m)
+        state = CellState::kOccupied;
     }
     if (!keepout.value.empty() && keepout.value[i] >= 50) state = CellState::kKeepout;
     global_.state[i] = state;
@@ -93,7 +100,8 @@ void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local
   if (!known.empty()) {
     for (const int ix : {known.x0, known.x1}) {
       for (const int iy : {known.y0, known.y1}) {
-        const Point2 corner = T_map_local * Point2{l.origin_x_m + ix * l.resolution_m, l.origin_y_m + iy * l.resolution_m};
+        const Point2 corner =
+            T_map_local * Point2{l.origin_x_m + ix * l.resolution_m, l.origin_y_m + iy * l.resolution_m};
         window.include(g.cell_x(corner.x_m), g.cell_y(corner.y_m));
       }
     }
@@ -111,7 +119,8 @@ void CombinedMap::clear_local() {
   apply(old_window);
 }
 
-void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_local, const CellWindow& window) {
+void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_local,
+                               const CellWindow& window) {
   const GridGeometry& g = global_.geometry;
   const GridGeometry& l = local.geometry;
   local_cells_.resize(static_cast<std::size_t>(window.width()) * static_cast<std::size_t>(window.height()));
@@ -125,19 +134,23 @@ void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_lo
   for (int iy = window.y0; iy < window.y1; ++iy) {
     const Point2 first = T_local_map * Point2{g.center_x_m(window.x0), g.center_y_m(iy)};
     double x = (first.x_m - l.origin_x_m) / l.resolution_m, y = (first.y_m - l.origin_y_m) / l.resolution_m;
-    CellState* out = local_cells_.data() + static_cast<std::size_t>(iy - window.y0) * static_cast<std::size_t>(window.width());
+    CellState* out = local_cells_.data() +
+                     static_cast<std::size_t>(iy - window.y0) * static_cast<std::size_t>(window.width());
     for (int i = 0; i < window.width(); ++i, x += step_x, y += step_y) {
       const bool inside = x >= 0.0 && y >= 0.0 && x < l.width_cells && y < l.height_cells;
-      out[i] = inside ? by_value[local.value[l.index(static_cast<int>(x), static_cast<int>(y))] + 128] : CellState::kUnknown;
+      out[i] = inside ? by_value[local.value[l.index(static_cast<int>(x), static_cast<int>(y))] + 128]
+                      : CellState::kUnknown;
     }
   }
-  // A turned wall one cell thick would get holes that way, so each occupied cell also marks the cell it lies in.
+  // A turned wall one cell thick would get holes that way, so each occupied cell also marks the cell it lies
+  // in.
   const double c = std::cos(T_map_local.yaw_rad), s = std::sin(T_map_local.yaw_rad);
   for (int iy = 0; iy < l.height_cells; ++iy) {
     for (int ix = 0; ix < l.width_cells; ++ix) {
       if (by_value[local.value[l.index(ix, iy)] + 128] != CellState::kOccupied) continue;
       const double lx = l.center_x_m(ix), ly = l.center_y_m(iy);
-      const int gx = g.cell_x(T_map_local.x_m + c * lx - s * ly), gy = g.cell_y(T_map_local.y_m + s * lx + c * ly);
+      const int gx = g.cell_x(T_map_local.x_m + c * lx - s * ly),
+                gy = g.cell_y(T_map_local.y_m + s * lx + c * ly);
       if (gx < window.x0 || gy < window.y0 || gx >= window.x1 || gy >= window.y1) continue;
       local_cells_[static_cast<std::size_t>(gy - window.y0) * static_cast<std::size_t>(window.width()) +
                    static_cast<std::size_t>(gx - window.x0)] = CellState::kOccupied;
@@ -168,8 +181,8 @@ void CombinedMap::apply(const CellWindow& window) {
   }
   if (dirty.empty()) return;
   const GridGeometry& g = global_.geometry;
-  distance_.update(g.width_cells, g.height_cells, bytes(combined_.state), kOpen, dirty.grown(distance_.reach_cells() + 1),
-                   combined_.squared_cells.data());
+  distance_.update(g.width_cells, g.height_cells, bytes(combined_.state), kOpen,
+                   dirty.grown(distance_.reach_cells() + 1), combined_.squared_cells.data());
 }
 
 }  // namespace knav

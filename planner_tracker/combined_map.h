@@ -14,8 +14,8 @@ namespace knav {
 
 enum class CellState : std::uint8_t { kUnknown = 0, kFree = 1, kOccupied = 2, kKeepout = 3 };
 
-/// The overlay rule: what the local map saw, free or occupied, is newer than the global map and overrides it; what it
-/// did not see changes nothing; a keepout is never cleared.
+/// The overlay rule: what the local map saw, free or occupied, is newer than the global map and overrides it;
+/// what it did not see changes nothing; a keepout is never cleared.
 constexpr CellState overlay(CellState global, CellState local) {
   return global == CellState::kKeepout || local == CellState::kUnknown ? global : local;
 }
@@ -33,8 +33,8 @@ struct MapLayer {
   std::int16_t squared_at(int ix, int iy) const {
     return geometry.contains(ix, iy) ? squared_cells[geometry.index(ix, iy)] : std::int16_t{0};
   }
-  /// From a point's cell to the edge of the nearest cell that is not free [m]; at most about the layer's reach,
-  /// 0 in cells that are not free and outside the map.
+  /// From a point's cell to the edge of the nearest cell that is not free [m]; at most about the layer's
+  /// reach, 0 in cells that are not free and outside the map.
   double clearance_m(double x_m, double y_m) const {
     return clearance_of(squared_at(geometry.cell_x(x_m), geometry.cell_y(y_m)));
   }
@@ -51,15 +51,16 @@ class CombinedMap {
   /// @param reach_m clearances are exact up to this
   CombinedMap(double reach_m, int occupied_threshold, int free_threshold);
 
-  /// @param occupancy may be empty if `distance` is not, and the other way round; @param keepout may be empty.
-  /// Both given: a cell is free only if both say so. Throws UserError if both are empty or sizes do not fit.
+  /// @param occupancy may be empty if `distance` is not, and the other way round; @param keepout may be
+  /// empty. Both given: a cell is free only if both say so. Throws UserError if both are empty or sizes do
+  /// not fit.
   void set_global(const DistanceMap& distance, const OccupancyGrid& occupancy, const OccupancyGrid& keepout);
   /// Replaces the previous local map. Clearances are recomputed round the cells that changed.
   void set_local(const OccupancyGrid& local, const Pose2& T_map_local);
   void clear_local();
 
   bool empty() const { return global_.state.empty(); }
-  const MapLayer& global() const { return global_; }      ///< with keepout, without local map
+  const MapLayer& global() const { return global_; }  ///< with keepout, without local map
   const MapLayer& combined() const { return combined_; }
   /// Cells whose state changed in the last call.
   std::size_t changed_cells() const { return changed_cells_; }
@@ -73,8 +74,8 @@ class CombinedMap {
   int occupied_threshold_, free_threshold_;
   MapLayer global_, combined_;
   TruncatedDistance distance_;
-  CellWindow local_window_;                ///< of the last local map
-  std::vector<CellState> local_cells_;     ///< of `local_window_`, row-major
+  CellWindow local_window_;             ///< of the last local map
+  std::vector<CellState> local_cells_;  ///< of `local_window_`, row-major
   std::size_t changed_cells_ = 0;
 };
 

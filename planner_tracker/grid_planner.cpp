@@ -64,7 +64,8 @@ void GridPlanner::Search::label_parts(const MapLayer& layer) {
 
 bool GridPlanner::Search::apart(const MapLayer& layer, const Cell& a, const Cell& b) const {
   if (&layer != labelled) return false;
-  const std::uint16_t pa = part[layer.geometry.index(a.ix, a.iy)], pb = part[layer.geometry.index(b.ix, b.iy)];
+  const std::uint16_t pa = part[layer.geometry.index(a.ix, a.iy)],
+                      pb = part[layer.geometry.index(b.ix, b.iy)];
   return pa != 0 && pb != 0 && pa != pb;
 }
 
@@ -74,13 +75,13 @@ void GridPlanner::set_map(const MapLayer& layer) {
   search_->label_parts(layer);
 }
 
-/// Dijkstra from a closed cell through cells that never come nearer to something, to the first open one. Cells under
-/// the robot may be anything: it stands there.
+/// Dijkstra from a closed cell through cells that never come nearer to something, to the first open one.
+/// Cells under the robot may be anything: it stands there.
 bool GridPlanner::Search::find_escape(const MapLayer& layer, const Cell& start, Cell* out) {
   escape.clear();
   const double resolution = layer.geometry.resolution_m;
   const int r = std::max(1, static_cast<int>(config.clearance.escape_m / resolution));
-  const int under = static_cast<int>(config.robot_radius / resolution);
+  const int under = static_cast<int>(0.5 * config.robot_radius / resolution);
   const int side = 2 * r + 1;
   std::vector<float> cost(static_cast<std::size_t>(side * side), std::numeric_limits<float>::infinity());
   std::vector<int> parent(cost.size(), -1);
@@ -118,7 +119,8 @@ bool GridPlanner::Search::find_escape(const MapLayer& layer, const Cell& start, 
   return false;
 }
 
-bool GridPlanner::Search::find_way(const MapLayer& layer, const Cell& start, const Cell& goal, PlanResult* result) {
+bool GridPlanner::Search::find_way(const MapLayer& layer, const Cell& start, const Cell& goal,
+                                   PlanResult* result) {
   if (apart(layer, start, goal)) {
     result->at = {layer.geometry.center_x_m(goal.ix), layer.geometry.center_y_m(goal.iy)};
     return false;
@@ -199,10 +201,12 @@ double GridPlanner::segment_cost_m(const MapLayer& layer, const Point2& from, co
 }
 
 bool GridPlanner::open(const MapLayer& layer, const Point2& point) const {
-  return search_->price.open(layer.squared_at(layer.geometry.cell_x(point.x_m), layer.geometry.cell_y(point.y_m)));
+  return search_->price.open(
+      layer.squared_at(layer.geometry.cell_x(point.x_m), layer.geometry.cell_y(point.y_m)));
 }
 
-bool GridPlanner::nearest_open(const MapLayer& layer, const Point2& point, double within_m, Point2* found) const {
+bool GridPlanner::nearest_open(const MapLayer& layer, const Point2& point, double within_m,
+                               Point2* found) const {
   const GridGeometry& g = layer.geometry;
   const int cx = g.cell_x(point.x_m), cy = g.cell_y(point.y_m);
   const int r = static_cast<int>(within_m / g.resolution_m);

@@ -14,18 +14,18 @@ enum class PlanCode { kOk, kStartBlocked, kGoalOccupied, kGoalUnknown, kNoPath }
 
 struct PlanResult {
   PlanCode code = PlanCode::kNoPath;
-  Point2 at;                    ///< the offending point, unless kOk
-  std::vector<Point2> path;     ///< corners of a polyline, start and goal included
+  Point2 at;                 ///< the offending point, unless kOk
+  std::vector<Point2> path;  ///< corners of a polyline, start and goal included
   double length_m = 0.0;
-  double cost_m = 0.0;          ///< length, dearer near obstacles
-  int expanded = 0;             ///< nodes taken from the open list
+  double cost_m = 0.0;  ///< length, dearer near obstacles
+  int expanded = 0;     ///< nodes taken from the open list
 };
 
-/// Shortest clearance-aware paths: A* on every second cell, 16 neighbours, bucket queue, then pulled straight where
-/// that is not dearer. The straight distance is its only bound: bounds prepared from the map (landmarks) would be
-/// blind to doors that opened since, and 3 ms for 27 m across a hospital need none. Where every second cell finds
-/// nothing, every cell is searched. A cell is driven on only if the whole footprint disc, hard clearance included,
-/// lies over free cells.
+/// Shortest clearance-aware paths: A* on every second cell, 16 neighbours, bucket queue, then pulled straight
+/// where that is not dearer. The straight distance is its only bound: bounds prepared from the map
+/// (landmarks) would be blind to doors that opened since, and 3 ms for 27 m across a hospital need none.
+/// Where every second cell finds nothing, every cell is searched. A cell is driven on only if the whole
+/// footprint disc, hard clearance included, lies over free cells.
 class GridPlanner {
  public:
   explicit GridPlanner(const PlannerTrackerConfig& config);

@@ -79,8 +79,10 @@ bool GridSearch::find(const SearchGraph& graph, const Cell& start, const Cell& g
         const double length = std::hypot(jx * stride - start.ix, jy * stride - start.iy) * cell_mm;
         const auto g = static_cast<std::uint32_t>(length);
         const std::uint32_t h = bound_mm(jx, jy);
-        if (pass == 0) lowest = std::min(lowest, (g + h) >> kBucketShift);
-        else open(graph.node(jx, jy), g, kNoParent, h);
+        if (pass == 0)
+          lowest = std::min(lowest, (g + h) >> kBucketShift);
+        else
+          open(graph.node(jx, jy), g, kNoParent, h);
       }
     }
     bucket_ = lowest;

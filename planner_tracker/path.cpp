@@ -47,7 +47,8 @@ void Path::advance(const Point2& robot) {
 Point2 Path::point_at(double along_m) const {
   if (along_m <= 0.0) return points_.front();
   if (along_m >= length_m()) return points_.back();
-  const auto after = static_cast<std::size_t>(std::upper_bound(along_m_.begin(), along_m_.end(), along_m) - along_m_.begin());
+  const auto after = static_cast<std::size_t>(std::upper_bound(along_m_.begin(), along_m_.end(), along_m) -
+                                              along_m_.begin());
   const Point2 &a = points_[after - 1], &b = points_[after];
   const double t = (along_m - along_m_[after - 1]) / (along_m_[after] - along_m_[after - 1]);
   return {a.x_m + t * (b.x_m - a.x_m), a.y_m + t * (b.y_m - a.y_m)};

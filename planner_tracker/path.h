@@ -17,8 +17,8 @@ class Path {
   const std::vector<Point2>& points() const { return points_; }
   Point2 end() const { return points_.back(); }
 
-  /// Moves the place on it to the point nearest to the robot, looked for from a little behind the last one to a few
-  /// metres ahead, so that a path that comes back beside itself is not cut short.
+  /// Moves the place on it to the point nearest to the robot, looked for from a little behind the last one to
+  /// a few metres ahead, so that a path that comes back beside itself is not cut short.
   void advance(const Point2& robot);
   double at_m() const { return at_m_; }
   double remaining_m() const { return length_m() - at_m_; }

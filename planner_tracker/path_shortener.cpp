@@ -20,7 +20,8 @@ double PathShortener::segment_cost_m(const MapLayer& layer, const ClearancePrice
   const GridGeometry& g = layer.geometry;
   const double length = length_m(from, to);
   const int steps = std::max(1, static_cast<int>(std::ceil(length / g.resolution_m)));
-  const double dx = (to.x_m - from.x_m) / steps / g.resolution_m, dy = (to.y_m - from.y_m) / steps / g.resolution_m;
+  const double dx = (to.x_m - from.x_m) / steps / g.resolution_m,
+               dy = (to.y_m - from.y_m) / steps / g.resolution_m;
   double x = (from.x_m - g.origin_x_m) / g.resolution_m, y = (from.y_m - g.origin_y_m) / g.resolution_m;
   std::uint64_t sum = 0;
   for (int i = 0; i <= steps; ++i, x += dx, y += dy) {
@@ -60,8 +61,10 @@ void PathShortener::pull(const MapLayer& layer, const ClearancePrice& price, std
       step *= 2;
     }
     if (bad == n && good + 1 < n) {
-      if (straight(i, n - 1)) good = n - 1;
-      else bad = n - 1;
+      if (straight(i, n - 1))
+        good = n - 1;
+      else
+        bad = n - 1;
     }
     while (bad < n && good + 1 < bad) {
       const std::size_t middle = (good + bad) / 2;
@@ -89,8 +92,8 @@ void PathShortener::split(double longest_m, std::vector<Point2>* points) {
 
 void PathShortener::shorten(const MapLayer& layer, const ClearancePrice& price, std::vector<Point2>* points) {
   pull(layer, price, points);
-  // Corners of the first pass lie where the search put them; between points set anew, the second pass finds shorter
-  // cuts. Run backwards, so that its greed has the other direction.
+  // Corners of the first pass lie where the search put them; between points set anew, the second pass finds
+  // shorter cuts. Run backwards, so that its greed has the other direction.
   split(0.4, points);
   std::reverse(points->begin(), points->end());
   pull(layer, price, points);

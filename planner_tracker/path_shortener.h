@@ -11,7 +11,8 @@ namespace knav {
 class PathShortener {
  public:
   /// Cost [m] of a straight line, sampled a cell apart; +Inf if a sample is closed.
-  double segment_cost_m(const MapLayer& layer, const ClearancePrice& price, const Point2& from, const Point2& to) const;
+  double segment_cost_m(const MapLayer& layer, const ClearancePrice& price, const Point2& from,
+                        const Point2& to) const;
   /// @param points a way whose consecutive points can be driven straight; corners remain
   void shorten(const MapLayer& layer, const ClearancePrice& price, std::vector<Point2>* points);
 

@@ -27,8 +27,14 @@ double PathTracker::clearance_m(const TrackInput& input, double x_m, double y_m)
   return std::min(input.scan->clearance_m(x_m, y_m), input.layer->clearance_m(p.x_m, p.y_m));
 }
 
-PathTracker::Rollout PathTracker::roll_out(const TrackInput& input, double curvature, double length_m, double near_m,
-                                           bool backwards) const {
+bool PathTracker::unknown_ground(const TrackInput& input, double x_m, double y_m) const {
+  if (std::hypot(x_m, y_m) <= 0.5 * config_.robot_radius) return false;
+  const Point2 p = input.T_map_base * Point2{x_m, y_m};
+  return input.layer->clearance_m(p.x_m, p.y_m) <= 0.0;
+}
+
+PathTracker::Rollout PathTracker::roll_out(const TrackInput& input, double curvature, double length_m,
+                                           double near_m, bool backwards) const {
   Rollout out;
   const double here = clearance_m(input, 0.0, 0.0);
   out.least_clearance_m = here;
@@ -40,7 +46,7 @@ PathTracker::Rollout PathTracker::roll_out(const TrackInput& input, double curva
     const double middle = yaw + 0.5 * curvature * step;
     const double x = out.end_x_m + step * std::cos(middle), y = out.end_y_m + step * std::sin(middle);
     const double c = clearance_m(input, x, y);
-    if (c < demanded) break;
+    if (c < demanded || unknown_ground(input, x, y)) break;
     demanded = std::min(stop_radius_m_, std::max(demanded, c - 0.03));
     yaw += curvature * step;
     out.end_x_m = x;
@@ -55,8 +61,9 @@ double PathTracker::straight_free_m(const TrackInput& input, double bearing_rad,
   double demanded = std::min(stop_radius_m_, clearance_m(input, 0.0, 0.0) - 0.005);
   double s = 0.0;
   for (; s < length_m; s += kStep_m) {
-    const double c = clearance_m(input, (s + kStep_m) * std::cos(bearing_rad), (s + kStep_m) * std::sin(bearing_rad));
-    if (c < demanded) break;
+    const double x = (s + kStep_m) * std::cos(bearing_rad), y = (s + kStep_m) * std::sin(bearing_rad);
+    const double c = clearance_m(input, x, y);
+    if (c < demanded || unknown_ground(input, x, y)) break;
     demanded = std::min(stop_radius_m_, std::max(demanded, c - 0.03));
   }
   return std::min(s, length_m);
@@ -74,7 +81,8 @@ TrackOutput PathTracker::turn(const TrackInput& input, double error_rad) const {
   out.kind = TrackOutput::Kind::kTurning;
   out.v_mps = approach(input.v_mps, 0.0, config_.tracking.stop_decel_mps2 * input.dt_s);
   // Braking at 60 % of what the wheels can do ends the turn without overshoot.
-  double w = std::min(config_.max_vel_theta, std::sqrt(2.0 * 0.6 * config_.acc_lim_theta * std::abs(error_rad)));
+  double w =
+      std::min(config_.max_vel_theta, std::sqrt(2.0 * 0.6 * config_.acc_lim_theta * std::abs(error_rad)));
   w = std::max(w * std::min(1.0, std::abs(error_rad) / 0.1), config_.tracking.min_in_place_vel_theta);
   if (std::abs(error_rad) < 0.01) w = 0.0;
   out.w_radps = approach(input.w_radps, std::copysign(w, error_rad), config_.acc_lim_theta * input.dt_s);
@@ -143,7 +151,8 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
       const Rollout r = roll_out(input, k, std::min(reach, 0.8), 0.6, false);
       if (r.free_m < enough) continue;
       const double off = std::hypot(r.end_x_m - target.x_m, r.end_y_m - target.y_m);
-      const double cost = off + 0.05 * std::abs(i) + 0.5 * std::max(0.0, config_.preferred_radius_m() - r.least_clearance_m);
+      const double cost =
+          off + 0.05 * std::abs(i) + 0.5 * std::max(0.0, config_.preferred_radius_m() - r.least_clearance_m);
       if (cost < best && r.end_x_m > 0.1) {
         best = cost;
         best_curvature = k;
@@ -164,8 +173,10 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
   }
 
   // Every limit has its own reason; the lowest holds.
-  const double near_share = std::clamp((ahead.least_clearance_m - config_.hard_radius_m()) /
-                                           std::max(0.01, config_.preferred_radius_m() - config_.hard_radius_m()), 0.0, 1.0);
+  const double near_share =
+      std::clamp((ahead.least_clearance_m - config_.hard_radius_m()) /
+                     std::max(0.01, config_.preferred_radius_m() - config_.hard_radius_m()),
+                 0.0, 1.0);
   double v = t.slow_mps + (config_.max_vel_x - t.slow_mps) * near_share;
   v = std::min(v, config_.max_vel_x);
   v *= std::clamp(1.0 - 0.8 * (std::abs(bearing) - 0.2) / t.turn_first_rad, 0.15, 1.0);
@@ -181,8 +192,10 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
   }
   TrackOutput out;
   const double down = (brake ? t.stop_decel_mps2 : config_.acc_lim_x) * input.dt_s;
-  out.v_mps = v < input.v_mps ? std::max(v, input.v_mps - down) : std::min(v, std::max(input.v_mps, 0.0) + config_.acc_lim_x * input.dt_s);
-  out.w_radps = approach(input.w_radps, std::clamp(out.v_mps * curvature, -config_.max_vel_theta, config_.max_vel_theta),
+  out.v_mps = v < input.v_mps ? std::max(v, input.v_mps - down)
+                              : std::min(v, std::max(input.v_mps, 0.0) + config_.acc_lim_x * input.dt_s);
+  out.w_radps = approach(input.w_radps,
+                         std::clamp(out.v_mps * curvature, -config_.max_vel_theta, config_.max_vel_theta),
                          config_.acc_lim_theta * input.dt_s);
   return out;
 }

@@ -13,7 +13,7 @@ struct TrackInput {
   Pose2 T_map_base;
   double v_mps = 0.0, w_radps = 0.0;  ///< commanded last
   double dt_s = 0.05;
-  const MapLayer* layer = nullptr;    ///< the combined map
+  const MapLayer* layer = nullptr;  ///< the combined map
   const ScanView* scan = nullptr;
 };
 
@@ -24,8 +24,8 @@ struct TrackOutput {
   Point2 obstacle;  ///< kBlocked: where on the map the way ends
 };
 
-/// Follows a path: steers an arc at a point a little ahead, looked along first by a rollout of the footprint through
-/// scan and map; turns in place where that point lies outside of what the camera sees.
+/// Follows a path: steers an arc at a point a little ahead, looked along first by a rollout of the footprint
+/// through scan and map; turns in place where that point lies outside of what the camera sees.
 class PathTracker {
  public:
   explicit PathTracker(const PlannerTrackerConfig& config);
@@ -51,9 +51,14 @@ class PathTracker {
     double free_m = 0.0, least_clearance_m = 0.0;
     double end_x_m = 0.0, end_y_m = 0.0;  ///< in the robot's frame, where it stopped being free
   };
-  Rollout roll_out(const TrackInput& input, double curvature_radpm, double length_m, double near_m, bool backwards) const;
+  Rollout roll_out(const TrackInput& input, double curvature_radpm, double length_m, double near_m,
+                   bool backwards) const;
 
  private:
+  /// True off the cells the map calls free. A robot that stands in the midst of unknown keeps clearance 0
+  /// wherever it goes, so that a rule of not coming nearer would not hold it. Under the footprint anything
+  /// may be: it stands there.
+  bool unknown_ground(const TrackInput& input, double x_m, double y_m) const;
   double approach(double from, double to, double step) const;
 
   PlannerTrackerConfig config_;

@@ -11,8 +11,10 @@ namespace knav {
 std::map<std::string, Pose2> load_places(const std::string& path) {
   namespace fs = std::filesystem;
   std::string file = path;
-  if (fs::is_directory(path)) file = (fs::path(path) / "places.yaml").string();
-  else if (fs::path(path).filename() == "map.yaml") file = (fs::path(path).parent_path() / "places.yaml").string();
+  if (fs::is_directory(path))
+    file = (fs::path(path) / "places.yaml").string();
+  else if (fs::path(path).filename() == "map.yaml")
+    file = (fs::path(path).parent_path() / "places.yaml").string();
   const YAML::Node root = load_yaml_file(file);
   std::map<std::string, Pose2> places;
   if (root.IsNull()) return places;

@@ -83,11 +83,12 @@ PlanKeeper::Outcome PlanKeeper::replan(const CombinedMap& map, const Point2& rob
   }
   if (result_.code == PlanCode::kOk) {
     const double old = path_kind_ == kind ? old_cost_m(layer, robot) : kInfinite;
-    const bool same_end = !path_.empty() && !result_.path.empty() &&
-                          std::hypot(path_.end().x_m - result_.path.back().x_m, path_.end().y_m - result_.path.back().y_m) <
-                              (kind == Outcome::kToGoal ? 0.01 : 0.3);
-    const bool clearly_better =
-        result_.cost_m < old * (1.0 - config_.planning.switch_gain) && result_.cost_m < old - config_.planning.switch_gain_m;
+    const bool same_end =
+        !path_.empty() && !result_.path.empty() &&
+        std::hypot(path_.end().x_m - result_.path.back().x_m, path_.end().y_m - result_.path.back().y_m) <
+            (kind == Outcome::kToGoal ? 0.01 : 0.3);
+    const bool clearly_better = result_.cost_m < old * (1.0 - config_.planning.switch_gain) &&
+                                result_.cost_m < old - config_.planning.switch_gain_m;
     if (!same_end || !std::isfinite(old) || clearly_better) take(result_.path);
     path_kind_ = kind;
     return kind;

@@ -11,15 +11,15 @@
 
 namespace knav {
 
-/// Replans, and decides what to make of the result: keeps the old plan unless the new one is clearly better, so that
-/// maps that shift against each other do not make the robot turn to and fro (the live-lock the paper speaks of), and
-/// where the way is closed for now goes there to look.
+/// Replans, and decides what to make of the result: keeps the old plan unless the new one is clearly better,
+/// so that maps that shift against each other do not make the robot turn to and fro (the live-lock the paper
+/// speaks of), and where the way is closed for now goes there to look.
 class PlanKeeper {
  public:
   enum class Outcome {
-    kToGoal,        ///< path() leads to the goal
-    kToNearby,      ///< something unexpected covers the goal: path() leads to a free point near it
-    kToBlockage,    ///< only the unchanged map has a way; path() leads up to where it is closed now: blockage()
+    kToGoal,      ///< path() leads to the goal
+    kToNearby,    ///< something unexpected covers the goal: path() leads to a free point near it
+    kToBlockage,  ///< only the unchanged map has a way; path() leads up to where it is closed now: blockage()
     kGoalOccupied,  ///< the robot cannot stand there, now or by the map: at()
     kGoalUnknown,
     kNoPath,        ///< not even the unchanged map has a way

@@ -53,7 +53,8 @@ OccupancyGrid grid_from_image(const Options& options) {
   return grid;
 }
 
-/// Every sample, a quarter of a cell apart, over a free cell and with the hard clearance less a cell's diagonal.
+/// Every sample, a quarter of a cell apart, over a free cell and with the hard clearance less a cell's
+/// diagonal.
 bool path_is_safe(const MapLayer& layer, const std::vector<Point2>& path, double hard_m) {
   for (std::size_t i = 1; i < path.size(); ++i) {
     const double length = std::hypot(path[i].x_m - path[i - 1].x_m, path[i].y_m - path[i - 1].y_m);
@@ -74,11 +75,13 @@ void draw(const std::string& file, const MapLayer& layer, const std::vector<std:
   for (int y = 0; y < g.height_cells; ++y) {
     for (int x = 0; x < g.width_cells; ++x) {
       const double c = layer.clearance_of(layer.squared_at(x, y));
-      const auto v = static_cast<std::uint8_t>(layer.at(x, y) != CellState::kFree ? 0 : 150 + 105 * std::min(c / 0.7, 1.0));
+      const auto v = static_cast<std::uint8_t>(
+          layer.at(x, y) != CellState::kFree ? 0 : 150 + 105 * std::min(c / 0.7, 1.0));
       picture.at<cv::Vec3b>(g.height_cells - 1 - y, x) = {v, v, v};
     }
   }
-  const cv::Scalar colors[] = {{0, 0, 220}, {200, 80, 0}, {0, 150, 0}, {180, 0, 180}, {0, 140, 255}, {160, 160, 0}};
+  const cv::Scalar colors[] = {{0, 0, 220},   {200, 80, 0},  {0, 150, 0},
+                               {180, 0, 180}, {0, 140, 255}, {160, 160, 0}};
   for (std::size_t i = 0; i < paths.size(); ++i) {
     std::vector<cv::Point> line;
     for (const Point2& p : paths[i]) line.push_back({g.cell_x(p.x_m), g.height_cells - 1 - g.cell_y(p.y_m)});
@@ -94,7 +97,8 @@ void run(Options options) {
     options.compared = std::min(options.compared, 10);
   }
   PlannerTrackerConfig config;
-  CombinedMap map(config.preferred_radius_m() + 0.2, config.clearance.occupied_threshold, config.clearance.free_threshold);
+  CombinedMap map(config.preferred_radius_m() + 0.2, config.clearance.occupied_threshold,
+                  config.clearance.free_threshold);
   const OccupancyGrid grid = grid_from_image(options);
   double start = now_ms();
   map.set_global({}, grid, {});
@@ -139,16 +143,21 @@ void run(Options options) {
     progress.update(static_cast<double>(time_ms.size()) / options.pairs);
   }
   if (!options.picture.empty()) draw(options.picture, layer, shown);
-  const double mean_ratio = ratio.empty() ? std::nan("") : [&] { double s = 0; for (double r : ratio) s += r; return s; }() /
-                                                               static_cast<double>(ratio.size());
+  const double mean_ratio = ratio.empty() ? std::nan("") : [&] {
+    double s = 0;
+    for (double r : ratio) s += r;
+    return s;
+  }() / static_cast<double>(ratio.size());
   fmt::print("clearance {:.0f} ms, parts {:.0f} ms\n", clearance_ms, prepare_ms);
-  fmt::print("{} pairs, length median {:.1f} m: median {:.2f} ms, 99 % {:.2f} ms, worst {:.2f} ms; {:.0f} nodes (median)\n",
-             time_ms.size(), quantile(length, 0.5), quantile(time_ms, 0.5), quantile(time_ms, 0.99),
-             quantile(time_ms, 1.0), quantile(expanded, 0.5));
+  fmt::print(
+      "{} pairs, length median {:.1f} m: median {:.2f} ms, 99 % {:.2f} ms, worst {:.2f} ms; {:.0f} nodes "
+      "(median)\n",
+      time_ms.size(), quantile(length, 0.5), quantile(time_ms, 0.5), quantile(time_ms, 0.99),
+      quantile(time_ms, 1.0), quantile(expanded, 0.5));
   fmt::print("{} unreachable pairs: median {:.1f} ms, worst {:.1f} ms\n", unreachable_ms.size(),
              quantile(unreachable_ms, 0.5), quantile(unreachable_ms, 1.0));
-  fmt::print("length / Theta* at the hard clearance, {} pairs: mean {:.4f}, worst {:.4f}; unsafe paths: {}\n", ratio.size(),
-             mean_ratio, quantile(ratio, 1.0), unsafe);
+  fmt::print("length / Theta* at the hard clearance, {} pairs: mean {:.4f}, worst {:.4f}; unsafe paths: {}\n",
+             ratio.size(), mean_ratio, quantile(ratio, 1.0), unsafe);
   const nlohmann::json json = {{"pairs", time_ms.size()},
                                {"plan_median_ms", quantile(time_ms, 0.5)},
                                {"plan_p99_ms", quantile(time_ms, 0.99)},
@@ -168,11 +177,13 @@ void run(Options options) {
 
 int main(int argc, char** argv) {
   knav::Options options;
-  CLI::App app("Plans between random points of a floor plan (dark = wall) and reports CPU time, length and safety.");
+  CLI::App app(
+      "Plans between random points of a floor plan (dark = wall) and reports CPU time, length and safety.");
   app.add_option("image", options.image, "floor plan")->required();
   app.add_option("--resolution", options.resolution_m, "m per pixel")->capture_default_str();
   app.add_option("--pairs", options.pairs, "reachable pairs")->capture_default_str();
-  app.add_option("--compared", options.compared, "of them compared with Theta* (slow)")->capture_default_str();
+  app.add_option("--compared", options.compared, "of them compared with Theta* (slow)")
+      ->capture_default_str();
   app.add_flag("--quick", options.quick, "200 pairs, 10 compared");
   app.add_option("--picture", options.picture, "PNG with the first six paths");
   app.add_option("--json", options.json,

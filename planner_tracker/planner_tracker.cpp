@@ -20,25 +20,38 @@ constexpr double kClockJump_s = 0.5;
 
 const char* to_string(Activity activity) {
   switch (activity) {
-    case Activity::kIdle: return "idle";
-    case Activity::kDriving: return "driving";
-    case Activity::kTurning: return "turning towards the path";
-    case Activity::kAligning: return "aligning at the goal";
-    case Activity::kWaiting: return "waiting for the way to clear";
-    case Activity::kApproaching: return "going to see whether the way is still closed";
-    case Activity::kAvoiding: return "recovery: reactive avoidance";
-    case Activity::kStopped: return "stopped: data missing";
-    case Activity::kLostTurning: return "recovery: lost, looking round";
-    case Activity::kLostWandering: return "recovery: lost, wandering";
-    case Activity::kReached: return "goal reached";
-    case Activity::kFailed: return "goal failed";
+    case Activity::kIdle:
+      return "idle";
+    case Activity::kDriving:
+      return "driving";
+    case Activity::kTurning:
+      return "turning towards the path";
+    case Activity::kAligning:
+      return "aligning at the goal";
+    case Activity::kWaiting:
+      return "waiting for the way to clear";
+    case Activity::kApproaching:
+      return "going to see whether the way is still closed";
+    case Activity::kAvoiding:
+      return "recovery: reactive avoidance";
+    case Activity::kStopped:
+      return "stopped: data missing";
+    case Activity::kLostTurning:
+      return "recovery: lost, looking round";
+    case Activity::kLostWandering:
+      return "recovery: lost, wandering";
+    case Activity::kReached:
+      return "goal reached";
+    case Activity::kFailed:
+      return "goal failed";
   }
   return "";
 }
 
 PlannerTracker::State::State(const PlannerTrackerConfig& c)
     : config(c),
-      map(c.preferred_radius_m() + kBeyondPreferred_m, c.clearance.occupied_threshold, c.clearance.free_threshold),
+      map(c.preferred_radius_m() + kBeyondPreferred_m, c.clearance.occupied_threshold,
+          c.clearance.free_threshold),
       keeper(c),
       tracker(c),
       moves(c, tracker),
@@ -51,7 +64,8 @@ PlannerTracker::PlannerTracker(const PlannerTrackerConfig& config) {
 }
 PlannerTracker::~PlannerTracker() = default;
 
-void PlannerTracker::set_map(const DistanceMap& distance, const OccupancyGrid& occupancy, const OccupancyGrid& keepout) {
+void PlannerTracker::set_map(const DistanceMap& distance, const OccupancyGrid& occupancy,
+                             const OccupancyGrid& keepout) {
   state_->map.set_global(distance, occupancy, keepout);
   state_->keeper.set_map(state_->map);
   state_->next_plan_s = -1.0;
@@ -65,7 +79,9 @@ void PlannerTracker::clear_local_map() {
   if (!state_->map.empty()) state_->map.clear_local();
 }
 
-void PlannerTracker::set_scan(const RangeScan& scan, const Pose2& T_base_sensor) { state_->scan.set(scan, T_base_sensor); }
+void PlannerTracker::set_scan(const RangeScan& scan, const Pose2& T_base_sensor) {
+  state_->scan.set(scan, T_base_sensor);
+}
 
 bool PlannerTracker::set_goal(const Pose2& T_map_goal) {
   State& s = *state_;

@@ -20,12 +20,12 @@ enum class LocalizationState { kUnknown, kOk, kUncertain, kLost, kInitializing }
 
 /// The robot, as known at a control step.
 struct RobotState {
-  bool has_pose = false;            ///< T_map_base is known at all
+  bool has_pose = false;  ///< T_map_base is known at all
   double pose_stamp_s = 0.0;
   Pose2 T_map_base;
   double odom_stamp_s = 0.0;
   Pose2 T_odom_base;
-  double v_mps = 0.0;               ///< from odometry
+  double v_mps = 0.0;  ///< from odometry
   double w_radps = 0.0;
   LocalizationState localization = LocalizationState::kUnknown;
   double localization_stamp_s = 0.0;
@@ -33,7 +33,7 @@ struct RobotState {
 
 /// What the robot is doing; to_string() gives the words for feedback and log.
 enum class Activity {
-  kIdle,         ///< no goal
+  kIdle,  ///< no goal
   kDriving,
   kTurning,      ///< in place, towards the path
   kAligning,     ///< in place, at the goal
@@ -74,8 +74,8 @@ struct Command {
   bool finished = false;  ///< in this step the goal ended: kReached, or kFailed with failure()
 };
 
-/// Takes the robot to goals over the combined map (paper section III.H). No ROS, one thread, no clock of its own:
-/// the same calls give the same commands. Never asks for motion without a goal.
+/// Takes the robot to goals over the combined map (paper section III.H). No ROS, one thread, no clock of its
+/// own: the same calls give the same commands. Never asks for motion without a goal.
 class PlannerTracker {
  public:
   /// Throws UserError if the configuration is not valid.
@@ -84,7 +84,8 @@ class PlannerTracker {
   PlannerTracker(const PlannerTracker&) = delete;
   PlannerTracker& operator=(const PlannerTracker&) = delete;
 
-  /// A new global map; any part may be empty but one of distance and occupancy. A goal goes on, on the new map.
+  /// A new global map; any part may be empty but one of distance and occupancy. A goal goes on, on the new
+  /// map.
   void set_map(const DistanceMap& distance, const OccupancyGrid& occupancy, const OccupancyGrid& keepout);
   /// The newest local map and where it lies. Before set_map() it has no effect.
   void set_local_map(const OccupancyGrid& local, const Pose2& T_map_local);
@@ -103,9 +104,9 @@ class PlannerTracker {
   /// One control step; times in seconds of the stamps' clock. A clock that jumps back ends the goal.
   Command step(double now_s, const RobotState& robot);
 
-  const Failure& failure() const;            ///< of the last goal
-  const std::string& explanation() const;    ///< why the robot does what it does, a sentence; "" = as planned
-  const std::vector<Point2>& path() const;   ///< being followed, from the robot on; empty if none
+  const Failure& failure() const;           ///< of the last goal
+  const std::string& explanation() const;   ///< why the robot does what it does, a sentence; "" = as planned
+  const std::vector<Point2>& path() const;  ///< being followed, from the robot on; empty if none
   const CombinedMap& map() const;
   /// A plan on the combined map between two points, for make_plan; does not touch the goal.
   PlanResult make_plan(const Point2& start, const Point2& goal, double tolerance_m);

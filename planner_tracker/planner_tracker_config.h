@@ -17,11 +17,14 @@ struct ClearanceConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v.number("hard_m", hard_m, 0, 1, "m", "Never nearer than this beyond the robot's radius.");
-    v.number("preferred_m", preferred_m, 0, 1.5, "m", "Nearer than this beyond the radius costs extra and is slow.");
+    v.number("preferred_m", preferred_m, 0, 1.5, "m",
+             "Nearer than this beyond the radius costs extra and is slow.");
     v.number("price", price, 0, 50, "", "A metre of path that just keeps hard_m costs 1 + price metres.");
     v.number("escape_m", escape_m, 0, 3, "m",
-             "A robot that stands nearer to something than hard_m may leave by a way this long that never comes nearer.");
-    v.integer("occupied_threshold", occupied_threshold, 1, 100, "%", "Cells of a map from here on are occupied.");
+             "A robot that stands nearer to something than hard_m may leave by a way this long that never "
+             "comes nearer.");
+    v.integer("occupied_threshold", occupied_threshold, 1, 100, "%",
+              "Cells of a map from here on are occupied.");
     v.integer("free_threshold", free_threshold, 0, 99, "%", "Cells up to this are free; between is unknown.");
   }
 };
@@ -41,12 +44,15 @@ struct PlanningConfig {
              "A new plan replaces a passable old one only if it is cheaper by this share ...");
     v.number("switch_gain_m", switch_gain_m, 0, 10, "m", "... and this much.");
     v.number("controller_patience", controller_patience, 0.1, 60, "s",
-             "The robot waits this long before something in its way, replanning, before it tries reactive avoidance.");
-    v.number("blocked_timeout_s", blocked_timeout_s, 1, 600, "s", "Without progress for this long the goal fails.");
+             "The robot waits this long before something in its way, replanning, before it tries reactive "
+             "avoidance.");
+    v.number("blocked_timeout_s", blocked_timeout_s, 1, 600, "s",
+             "Without progress for this long the goal fails.");
     v.number("slowness", slowness, 1, 100, "",
              "The goal fails after 60 s plus this many times what its first plan takes at full speed.");
     v.number("goal_snap_m", goal_snap_m, 0, 5, "m",
-             "While something unexpected stands on the goal, the robot goes to a free point within this distance.");
+             "While something unexpected stands on the goal, the robot goes to a free point within this "
+             "distance.");
   }
 };
 
@@ -63,7 +69,8 @@ struct TrackingConfig {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.number("lookahead_m", lookahead_m, 0.1, 3, "m", "The robot steers at the point of the path this far ahead.");
+    v.number("lookahead_m", lookahead_m, 0.1, 3, "m",
+             "The robot steers at the point of the path this far ahead.");
     v.number("turn_first_rad", turn_first_rad, 0.1, 3.2, "rad",
              "Further off than this, the robot turns in place, so that it sees where it will drive.");
     v.number("turned_rad", turned_rad, 0.02, 1, "rad", "Such a turn ends when this little is left.");
@@ -87,8 +94,10 @@ struct RecoveryConfig {
   void visit(Visitor& v) {
     v.number("lost_timeout_s", lost_timeout_s, 1, 3600, "s", "Lost for this long, the goal fails.");
     v.number("lost_turn_radps", lost_turn_radps, 0.05, 3, "rad/s", "A lost robot looks round at this rate.");
-    v.number("wander_radius_m", wander_radius_m, 0, 20, "m", "... then wanders, at most this far from there.");
-    v.number("avoid_min_m", avoid_min_m, 0.05, 2, "m", "Shortest of the random translations towards open space.");
+    v.number("wander_radius_m", wander_radius_m, 0, 20, "m",
+             "... then wanders, at most this far from there.");
+    v.number("avoid_min_m", avoid_min_m, 0.05, 2, "m",
+             "Shortest of the random translations towards open space.");
     v.number("avoid_max_m", avoid_max_m, 0.05, 5, "m", "Longest of them.");
   }
 };
@@ -104,9 +113,12 @@ struct FreshnessConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v.number("scan_s", scan_s, 0.05, 10, "s", "No new scan_360 for this long stops the robot.");
-    v.number("pose_s", pose_s, 0.05, 10, "s", "So does no new odometry or pose (TF map -> base_link) for this long,");
-    v.number("localization_s", localization_s, 0.1, 60, "s", "and a localizer silent for this long, once it spoke.");
-    v.number("latency_s", latency_s, 0.05, 10, "s", "Scans, odometry and poses whose stamps are older than this stop it too.");
+    v.number("pose_s", pose_s, 0.05, 10, "s",
+             "So does no new odometry or pose (TF map -> base_link) for this long,");
+    v.number("localization_s", localization_s, 0.1, 60, "s",
+             "and a localizer silent for this long, once it spoke.");
+    v.number("latency_s", latency_s, 0.05, 10, "s",
+             "Scans, odometry and poses whose stamps are older than this stop it too.");
     v.number("give_up_s", give_up_s, 0.1, 600, "s", "Stopped by missing data for this long, the goal fails.");
   }
 };
@@ -152,18 +164,21 @@ struct PlannerTrackerConfig {
            "Once within xy_goal_tolerance, only turn, whatever the localizer says next.");
     v.number("max_vel_x", max_vel_x, 0.05, 3, "m/s", "Fastest.");
     v.number("min_vel_x", min_vel_x, -1, 0, "m/s",
-             "Fastest backwards, used only over a goal just overshot and where scan_360 shows free space; 0 = never.");
+             "Fastest backwards, used only over a goal just overshot and where scan_360 shows free space; 0 "
+             "= never.");
     v.number("max_vel_theta", max_vel_theta, 0.1, 10, "rad/s", "Fastest turn.");
     v.number("acc_lim_x", acc_lim_x, 0.05, 10, "m/s^2", "Acceleration.");
     v.number("acc_lim_theta", acc_lim_theta, 0.1, 50, "rad/s^2", "Acceleration of turns.");
     v.number("robot_radius", robot_radius, 0.02, 2, "m", "Footprint, a disc round base_link.");
     v.number("oscillation_timeout", oscillation_timeout, 0, 600, "s",
-             "Driving for this long without leaving oscillation_distance calls for reactive avoidance; 0 = never.");
+             "Driving for this long without leaving oscillation_distance calls for reactive avoidance; 0 = "
+             "never.");
     v.number("oscillation_distance", oscillation_distance, 0.01, 10, "m", "See oscillation_timeout.");
     v.text("global_frame", global_frame, "Frame of the map.");
     v.text("robot_base_frame", robot_base_frame, "Frame of the robot.");
     v.text("odom_frame", odom_frame, "Frame of odometry.");
-    v.text("places_file", places_file, "places.yaml with named goals for go_to, or its map directory; empty = none.");
+    v.text("places_file", places_file,
+           "places.yaml with named goals for go_to, or its map directory; empty = none.");
     v.group("clearance", clearance, "Distances to obstacles.");
     v.group("planning", planning, "Global planning.");
     v.group("tracking", tracking, "Path following.");

@@ -9,11 +9,12 @@
 
 namespace knav {
 
-bool PlannerTrackerNodelet::goal_pose(const geometry_msgs::PoseStamped& message, Pose2* T_map_goal, std::string* fault) {
+bool PlannerTrackerNodelet::goal_pose(const geometry_msgs::PoseStamped& message, Pose2* T_map_goal,
+                                      std::string* fault) {
   const auto& p = message.pose.position;
   const auto& q = message.pose.orientation;
-  if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(q.x) || !std::isfinite(q.y) || !std::isfinite(q.z) ||
-      !std::isfinite(q.w)) {
+  if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(q.x) || !std::isfinite(q.y) ||
+      !std::isfinite(q.z) || !std::isfinite(q.w)) {
     *fault = "The goal holds a value that is not a number.";
     return false;
   }
@@ -38,7 +39,8 @@ bool PlannerTrackerNodelet::goal_pose(const geometry_msgs::PoseStamped& message,
   }
   Pose2 T_map_frame;
   if (!transform(config_.global_frame, frame, ros::Time(0), &T_map_frame, nullptr)) {
-    *fault = "The goal is given in the frame '" + frame + "', which has no transform to '" + config_.global_frame + "'.";
+    *fault = "The goal is given in the frame '" + frame + "', which has no transform to '" +
+             config_.global_frame + "'.";
     return false;
   }
   *T_map_goal = T_map_frame * T_frame_goal;
@@ -86,7 +88,8 @@ void PlannerTrackerNodelet::on_simple_goal(const geometry_msgs::PoseStamped::Con
   action_goal_pub_.publish(goal);
 }
 
-bool PlannerTrackerNodelet::on_make_plan(nav_msgs::GetPlan::Request& request, nav_msgs::GetPlan::Response& response) {
+bool PlannerTrackerNodelet::on_make_plan(nav_msgs::GetPlan::Request& request,
+                                         nav_msgs::GetPlan::Response& response) {
   response.plan.header.frame_id = config_.global_frame;
   response.plan.header.stamp = ros::Time::now();
   Pose2 start, goal;
@@ -105,8 +108,8 @@ bool PlannerTrackerNodelet::on_make_plan(nav_msgs::GetPlan::Request& request, na
     NODELET_WARN("make_plan: start: %s", fault.c_str());
     return false;
   }
-  const PlanResult result =
-      planner_->make_plan({start.x_m, start.y_m}, {goal.x_m, goal.y_m}, static_cast<double>(request.tolerance));
+  const PlanResult result = planner_->make_plan({start.x_m, start.y_m}, {goal.x_m, goal.y_m},
+                                                static_cast<double>(request.tolerance));
   for (std::size_t i = 0; i < result.path.size(); ++i) {
     const Point2& p = result.path[i];
     double yaw = goal.yaw_rad;
@@ -126,10 +129,12 @@ bool PlannerTrackerNodelet::on_clear_costmaps(std_srvs::Empty::Request&, std_srv
   return true;
 }
 
-bool PlannerTrackerNodelet::on_go_to(kinect_nav::GoTo::Request& request, kinect_nav::GoTo::Response& response) {
+bool PlannerTrackerNodelet::on_go_to(kinect_nav::GoTo::Request& request,
+                                     kinect_nav::GoTo::Response& response) {
   response.accepted = false;
   if (config_.places_file.empty()) {
-    response.message = "No places are known: set the parameter places_file to a places.yaml or a map directory.";
+    response.message =
+        "No places are known: set the parameter places_file to a places.yaml or a map directory.";
     return true;
   }
   try {

@@ -3,10 +3,10 @@
 #include <geometry_msgs/Twist.h>
 #include <kinect_nav/NavigationFailure.h>
 #include <nav_msgs/Path.h>
-#include <pluginlib/class_list_macros.hpp>
 #include <std_msgs/String.h>
 
 #include <cmath>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "core/error.h"
 #include "ros_common/conversions.h"
@@ -15,19 +15,21 @@
 namespace knav {
 namespace {
 
-/// Map, distance map and keepout come as three messages of one load: they are taken together after this silence.
+/// Map, distance map and keepout come as three messages of one load: they are taken together after this
+/// silence.
 constexpr double kMapSettles_s = 0.3;
 /// An overlay of 20 x 20 m takes 4 ms: not at every frame of the mapper.
 constexpr double kOverlayEvery_s = 0.14;
 
-nav_msgs::Path path_message(const std::vector<Point2>& points, const std::string& frame, const ros::Time& stamp,
-                            const Pose2* end) {
+nav_msgs::Path path_message(const std::vector<Point2>& points, const std::string& frame,
+                            const ros::Time& stamp, const Pose2* end) {
   nav_msgs::Path path;
   path.header.frame_id = frame;
   path.header.stamp = stamp;
   for (std::size_t i = 0; i < points.size(); ++i) {
     double yaw = end ? end->yaw_rad : 0.0;
-    if (i + 1 < points.size()) yaw = std::atan2(points[i + 1].y_m - points[i].y_m, points[i + 1].x_m - points[i].x_m);
+    if (i + 1 < points.size())
+      yaw = std::atan2(points[i + 1].y_m - points[i].y_m, points[i + 1].x_m - points[i].x_m);
     geometry_msgs::PoseStamped pose;
     pose.header = path.header;
     pose.pose = pose_message({points[i].x_m, points[i].y_m, yaw});
@@ -57,7 +59,8 @@ void PlannerTrackerNodelet::start() {
   action_->registerGoalCallback([this] { on_goal(); });
   action_->registerPreemptCallback([this] { on_preempt(); });
   action_->start();
-  control_timer_ = nh.createTimer(ros::Duration(1.0 / config_.controller_frequency), &PlannerTrackerNodelet::control, this);
+  control_timer_ = nh.createTimer(ros::Duration(1.0 / config_.controller_frequency),
+                                  &PlannerTrackerNodelet::control, this);
   costmap_timer_ = nh.createTimer(ros::Duration(1.0), &PlannerTrackerNodelet::publish_costmap, this);
   spinner_ = std::make_unique<ros::AsyncSpinner>(1, &queue_);
   spinner_->start();
@@ -71,7 +74,8 @@ void PlannerTrackerNodelet::advertise(ros::NodeHandle& nh) {
   activity_pub_ = nh.advertise<std_msgs::String>("navigation_activity", 5, true);
   action_goal_pub_ = nh.advertise<move_base_msgs::MoveBaseActionGoal>("move_base/goal", 1);
   make_plan_srv_ = nh.advertiseService("move_base/make_plan", &PlannerTrackerNodelet::on_make_plan, this);
-  clear_srv_ = nh.advertiseService("move_base/clear_costmaps", &PlannerTrackerNodelet::on_clear_costmaps, this);
+  clear_srv_ =
+      nh.advertiseService("move_base/clear_costmaps", &PlannerTrackerNodelet::on_clear_costmaps, this);
   go_to_srv_ = nh.advertiseService("go_to", &PlannerTrackerNodelet::on_go_to, this);
 }
 
@@ -81,8 +85,10 @@ void PlannerTrackerNodelet::subscribe(ros::NodeHandle& nh) {
   keepout_sub_ = nh.subscribe("keepout_map", 1, &PlannerTrackerNodelet::on_keepout, this);
   local_sub_ = nh.subscribe<nav_msgs::OccupancyGrid>(
       "local_map", 1, [this](const nav_msgs::OccupancyGrid::ConstPtr& message) { local_ = message; });
-  scan_sub_ = nh.subscribe("scan_360", 1, &PlannerTrackerNodelet::on_scan, this, ros::TransportHints().tcpNoDelay());
-  odom_sub_ = nh.subscribe("odom", 20, &PlannerTrackerNodelet::on_odometry, this, ros::TransportHints().tcpNoDelay());
+  scan_sub_ =
+      nh.subscribe("scan_360", 1, &PlannerTrackerNodelet::on_scan, this, ros::TransportHints().tcpNoDelay());
+  odom_sub_ =
+      nh.subscribe("odom", 20, &PlannerTrackerNodelet::on_odometry, this, ros::TransportHints().tcpNoDelay());
   status_sub_ = nh.subscribe("localization_status", 1, &PlannerTrackerNodelet::on_status, this);
   goal_sub_ = nh.subscribe("move_base_simple/goal", 1, &PlannerTrackerNodelet::on_simple_goal, this);
 }
@@ -111,7 +117,8 @@ void PlannerTrackerNodelet::rebuild_map() {
   if (!map_dirty_ || std::abs((now - map_changed_).toSec()) < kMapSettles_s) return;
   map_dirty_ = false;
   try {
-    planner_->set_map(distance_ ? distance_map_from(*distance_) : DistanceMap{}, map_ ? occupancy_from(*map_) : OccupancyGrid{},
+    planner_->set_map(distance_ ? distance_map_from(*distance_) : DistanceMap{},
+                      map_ ? occupancy_from(*map_) : OccupancyGrid{},
                       keepout_ ? occupancy_from(*keepout_) : OccupancyGrid{});
     NODELET_INFO("Map taken: %d x %d cells.", planner_->map().global().geometry.width_cells,
                  planner_->map().global().geometry.height_cells);
@@ -129,9 +136,10 @@ void PlannerTrackerNodelet::on_scan(const sensor_msgs::LaserScan::ConstPtr& mess
   } else if (message->header.frame_id == config_.robot_base_frame) {
     sensor_pose_[message->header.frame_id] = T_base_sensor;
   } else {
-    if (!transform(config_.robot_base_frame, message->header.frame_id, ros::Time(0), &T_base_sensor, nullptr)) {
-      NODELET_WARN_THROTTLE(5.0, "No transform from %s to %s yet; scans are ignored.", message->header.frame_id.c_str(),
-                            config_.robot_base_frame.c_str());
+    if (!transform(config_.robot_base_frame, message->header.frame_id, ros::Time(0), &T_base_sensor,
+                   nullptr)) {
+      NODELET_WARN_THROTTLE(5.0, "No transform from %s to %s yet; scans are ignored.",
+                            message->header.frame_id.c_str(), config_.robot_base_frame.c_str());
       return;
     }
     sensor_pose_[message->header.frame_id] = T_base_sensor;
@@ -156,8 +164,8 @@ void PlannerTrackerNodelet::on_status(const kinect_nav::LocalizationStatus::Cons
                                                                : LocalizationState::kInitializing;
 }
 
-bool PlannerTrackerNodelet::transform(const std::string& target, const std::string& source, ros::Time stamp, Pose2* T,
-                                      ros::Time* at) {
+bool PlannerTrackerNodelet::transform(const std::string& target, const std::string& source, ros::Time stamp,
+                                      Pose2* T, ros::Time* at) {
   try {
     const auto found = tf_.lookupTransform(target, source, stamp);
     *T = pose2_from(found.transform);
@@ -172,7 +180,8 @@ void PlannerTrackerNodelet::overlay_local_map() {
   const ros::Time now = ros::Time::now();
   if (!local_ || planner_->map().empty() || std::abs((now - overlaid_).toSec()) < kOverlayEvery_s) return;
   Pose2 T_map_local;
-  if (!transform(config_.global_frame, local_->header.frame_id, local_->header.stamp, &T_map_local, nullptr)) {
+  if (!transform(config_.global_frame, local_->header.frame_id, local_->header.stamp, &T_map_local,
+                 nullptr)) {
     // Not there yet: asked again at the next step, but an old one is no use.
     if ((ros::Time::now() - local_->header.stamp).toSec() > 1.0) local_.reset();
     return;
@@ -227,8 +236,9 @@ void PlannerTrackerNodelet::control(const ros::TimerEvent&) {
 void PlannerTrackerNodelet::announce(Activity activity) {
   const std::string& why = planner_->explanation();
   if (activity == announced_ && why == explained_) return;
-  const bool news = why != explained_ || activity == Activity::kAvoiding || activity == Activity::kLostTurning ||
-                    activity == Activity::kLostWandering || activity == Activity::kStopped;
+  const bool news = why != explained_ || activity == Activity::kAvoiding ||
+                    activity == Activity::kLostTurning || activity == Activity::kLostWandering ||
+                    activity == Activity::kStopped;
   announced_ = activity;
   explained_ = why;
   std_msgs::String text;
@@ -262,7 +272,8 @@ void PlannerTrackerNodelet::publish_failure(const Failure& failure) {
 
 void PlannerTrackerNodelet::publish_plan() {
   if (plan_pub_.getNumSubscribers() == 0) return;
-  plan_pub_.publish(path_message(planner_->path(), config_.global_frame, ros::Time::now(), &planner_->goal()));
+  plan_pub_.publish(
+      path_message(planner_->path(), config_.global_frame, ros::Time::now(), &planner_->goal()));
 }
 
 void PlannerTrackerNodelet::publish_costmap(const ros::TimerEvent&) {
@@ -273,13 +284,16 @@ void PlannerTrackerNodelet::publish_costmap(const ros::TimerEvent&) {
   grid.header.stamp = ros::Time::now();
   grid.info = metadata_from(layer.geometry);
   grid.data.resize(layer.state.size());
-  // costmap_2d's values: 100 something there, 99 closed to the centre, then falling to 0 at the preferred clearance.
+  // costmap_2d's values: 100 something there, 99 closed to the centre, then falling to 0 at the preferred
+  // clearance.
   const double hard = config_.hard_radius_m(), preferred = config_.preferred_radius_m();
   for (std::size_t i = 0; i < grid.data.size(); ++i) {
     const double c = layer.clearance_of(layer.squared_cells[i]);
     double value = c < hard ? 99.0 : c >= preferred ? 0.0 : 1.0 + 97.0 * (preferred - c) / (preferred - hard);
-    if (layer.state[i] == CellState::kUnknown) value = -1.0;
-    else if (layer.state[i] != CellState::kFree) value = 100.0;
+    if (layer.state[i] == CellState::kUnknown)
+      value = -1.0;
+    else if (layer.state[i] != CellState::kFree)
+      value = 100.0;
     grid.data[i] = static_cast<std::int8_t>(value);
   }
   costmap_pub_.publish(grid);

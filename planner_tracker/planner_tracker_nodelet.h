@@ -25,8 +25,8 @@
 
 namespace knav {
 
-/// move_base's interface round PlannerTracker. All callbacks and the control loop run in one thread of its own: no
-/// locks, and a busy nodelet manager does not delay cmd_vel.
+/// move_base's interface round PlannerTracker. All callbacks and the control loop run in one thread of its
+/// own: no locks, and a busy nodelet manager does not delay cmd_vel.
 class PlannerTrackerNodelet : public NodeletBase {
  public:
   PlannerTrackerNodelet();
@@ -65,7 +65,8 @@ class PlannerTrackerNodelet : public NodeletBase {
   void stop_base();
   /// The goal as a plane pose in the global frame; false, with a sentence, if it is none.
   bool goal_pose(const geometry_msgs::PoseStamped& message, Pose2* T_map_goal, std::string* fault);
-  bool transform(const std::string& target, const std::string& source, ros::Time stamp, Pose2* T, ros::Time* at);
+  bool transform(const std::string& target, const std::string& source, ros::Time stamp, Pose2* T,
+                 ros::Time* at);
 
   PlannerTrackerConfig config_;
   std::unique_ptr<PlannerTracker> planner_;
@@ -74,7 +75,8 @@ class PlannerTrackerNodelet : public NodeletBase {
   tf2_ros::Buffer tf_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   std::unique_ptr<ActionServer> action_;
-  ros::Subscriber map_sub_, distance_sub_, keepout_sub_, local_sub_, scan_sub_, odom_sub_, status_sub_, goal_sub_;
+  ros::Subscriber map_sub_, distance_sub_, keepout_sub_, local_sub_, scan_sub_, odom_sub_, status_sub_,
+      goal_sub_;
   ros::Publisher cmd_vel_pub_, plan_pub_, failure_pub_, costmap_pub_, activity_pub_, action_goal_pub_;
   ros::ServiceServer make_plan_srv_, clear_srv_, go_to_srv_;
   ros::Timer control_timer_, costmap_timer_;

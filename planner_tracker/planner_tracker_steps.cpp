@@ -9,7 +9,7 @@
 namespace knav {
 namespace {
 
-constexpr double kFoundFor_s = 0.5;      ///< localized for this long ends the recovery
+constexpr double kFoundFor_s = 0.5;        ///< localized for this long ends the recovery
 constexpr double kFailedPlanWait_s = 1.0;  ///< a search that finds nothing is the dearest
 constexpr double kReplanOnEnd_m = 0.15;
 
@@ -19,18 +19,29 @@ Point2 position(const Pose2& pose) { return {pose.x_m, pose.y_m}; }
 
 bool PlannerTracker::State::stopped_by_missing_data(double now_s, const RobotState& robot) {
   const FreshnessConfig& f = config.freshness;
-  const auto stale = [&](const Freshness& data, double limit_s) { return data.stale(now_s, limit_s, f.latency_s); };
+  const auto stale = [&](const Freshness& data, double limit_s) {
+    return data.stale(now_s, limit_s, f.latency_s);
+  };
   const char* why = nullptr;
-  if (map.empty()) why = "There is no map yet.";
-  else if (scan.empty()) why = "No scan_360 came yet; is the local mapper running?";
-  else if (stale(scan_fresh, f.scan_s)) why = "The last scan_360 is too old; the camera or the local mapper stopped.";
-  else if (stale(odometry_fresh, f.pose_s)) why = "The last odometry is too old; the base stopped sending it.";
-  else if (!robot.has_pose) why = "There is no transform from the map to the robot; is the localizer running?";
-  else if (stale(pose_fresh, f.pose_s)) why = "The transform from the map to the robot is too old; the localizer stopped.";
-  else if (!is_finite(robot.T_map_base) || !is_finite(robot.T_odom_base)) why = "The robot's pose is not finite.";
-  else if (robot.localization != LocalizationState::kUnknown && now_s - robot.localization_stamp_s > f.localization_s) {
+  if (map.empty())
+    why = "There is no map yet.";
+  else if (scan.empty())
+    why = "No scan_360 came yet; is the local mapper running?";
+  else if (stale(scan_fresh, f.scan_s))
+    why = "The last scan_360 is too old; the camera or the local mapper stopped.";
+  else if (stale(odometry_fresh, f.pose_s))
+    why = "The last odometry is too old; the base stopped sending it.";
+  else if (!robot.has_pose)
+    why = "There is no transform from the map to the robot; is the localizer running?";
+  else if (stale(pose_fresh, f.pose_s))
+    why = "The transform from the map to the robot is too old; the localizer stopped.";
+  else if (!is_finite(robot.T_map_base) || !is_finite(robot.T_odom_base))
+    why = "The robot's pose is not finite.";
+  else if (robot.localization != LocalizationState::kUnknown &&
+           now_s - robot.localization_stamp_s > f.localization_s) {
     why = "The localizer fell silent.";
-  } else if (robot.localization == LocalizationState::kInitializing) why = "The localizer has not started yet; give it an initial pose.";
+  } else if (robot.localization == LocalizationState::kInitializing)
+    why = "The localizer has not started yet; give it an initial pose.";
   if (why == nullptr) {
     if (missing_since_s >= 0.0) {
       missing_since_s = -1.0;
@@ -43,7 +54,8 @@ bool PlannerTracker::State::stopped_by_missing_data(double now_s, const RobotSta
   // Without eyes the brakes are the base's own: zero at once.
   act(Activity::kStopped, {});
   if (now_s - missing_since_s > f.give_up_s) {
-    fail(FailureCode::kNoSensorData, position(robot.T_map_base), fmt::format("{} Given up after {:.0f} s.", why, f.give_up_s));
+    fail(FailureCode::kNoSensorData, position(robot.T_map_base),
+         fmt::format("{} Given up after {:.0f} s.", why, f.give_up_s));
   }
   return true;
 }
@@ -87,7 +99,8 @@ bool PlannerTracker::State::stopped_by_lost(double now_s, const RobotState& robo
   found_since_s = -1.0;
   if (now_s - lost_since_s > config.recovery.lost_timeout_s) {
     fail(FailureCode::kLost, position(robot.T_map_base),
-         fmt::format("Not localized for {:.0f} s, after looking round and wandering.", config.recovery.lost_timeout_s));
+         fmt::format("Not localized for {:.0f} s, after looking round and wandering.",
+                     config.recovery.lost_timeout_s));
     return true;
   }
   turned_rad += normalize_angle_rad(robot.T_odom_base.yaw_rad - last_yaw_rad);
@@ -127,7 +140,8 @@ bool PlannerTracker::State::arrived(const RobotState& robot) {
   const double distance = std::hypot(T_base_goal.x_m, T_base_goal.y_m);
   if (!latched) {
     // Not at the tolerance's rim, if driving on still brings it nearer.
-    const bool nearest = distance < 0.4 * config.xy_goal_tolerance || T_base_goal.x_m < 0.3 * distance || input.v_mps < 0.03;
+    const bool nearest =
+        distance < 0.4 * config.xy_goal_tolerance || T_base_goal.x_m < 0.3 * distance || input.v_mps < 0.03;
     latched = distance < config.xy_goal_tolerance && nearest;
   } else if (!config.latch_xy_goal_tolerance && distance > config.xy_goal_tolerance) {
     latched = false;
@@ -144,7 +158,8 @@ bool PlannerTracker::State::arrived(const RobotState& robot) {
     command.finished = true;
     return true;
   }
-  act(Activity::kAligning, std::abs(error) < 0.5 * config.yaw_goal_tolerance ? tracker.stop(input) : tracker.turn(input, error));
+  act(Activity::kAligning,
+      std::abs(error) < 0.5 * config.yaw_goal_tolerance ? tracker.stop(input) : tracker.turn(input, error));
   return true;
 }
 
@@ -167,8 +182,9 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
       explanation = fmt::format("The way is closed at ({:.2f}, {:.2f}) m.", at.x_m, at.y_m);
       break;
     case Outcome::kGoalOccupied:
-      fail(FailureCode::kGoalOccupied, at,
-           fmt::format("The robot cannot stand at the goal: ({:.2f}, {:.2f}) m is occupied.", at.x_m, at.y_m));
+      fail(
+          FailureCode::kGoalOccupied, at,
+          fmt::format("The robot cannot stand at the goal: ({:.2f}, {:.2f}) m is occupied.", at.x_m, at.y_m));
       return true;
     case Outcome::kGoalUnknown:
       fail(FailureCode::kGoalUnknown, at,
@@ -176,7 +192,8 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
       return true;
     case Outcome::kNoPath:
       fail(FailureCode::kNoPath, at,
-           fmt::format("No way leads to the goal; the nearest place looked at is ({:.2f}, {:.2f}) m.", at.x_m, at.y_m));
+           fmt::format("No way leads to the goal; the nearest place looked at is ({:.2f}, {:.2f}) m.", at.x_m,
+                       at.y_m));
       return true;
     case Outcome::kStartBlocked:
       next_plan_s = now_s + kFailedPlanWait_s;
@@ -197,29 +214,35 @@ bool PlannerTracker::State::given_up(double now_s, const RobotState& robot) {
   if (!stuck && !slow) return false;
   using Outcome = PlanKeeper::Outcome;
   if (outcome == Outcome::kStartBlocked) {
-    fail(FailureCode::kStartOccupied, position(robot.T_map_base), "The robot stands in something and found no way out.");
+    fail(FailureCode::kStartOccupied, position(robot.T_map_base),
+         "The robot stands in something and found no way out.");
     return true;
   }
-  Point2 at = outcome == Outcome::kToGoal ? (blocked_since_s >= 0.0 ? blocked_at : position(robot.T_map_base)) : keeper.at();
+  Point2 at = outcome == Outcome::kToGoal ? (blocked_since_s >= 0.0 ? blocked_at : position(robot.T_map_base))
+                                          : keeper.at();
   const char* what = outcome == Outcome::kToNearby ? "Something stands on the goal" : "The way is closed";
   if (stuck) {
     fail(FailureCode::kBlocked, at,
-         fmt::format("{} at ({:.2f}, {:.2f}) m and no other way was found for {:.0f} s.", what, at.x_m, at.y_m,
-                     config.planning.blocked_timeout_s));
+         fmt::format("{} at ({:.2f}, {:.2f}) m and no other way was found for {:.0f} s.", what, at.x_m,
+                     at.y_m, config.planning.blocked_timeout_s));
   } else {
     fail(FailureCode::kBlocked, at,
-         fmt::format("Given up after {:.0f} s: the way to the goal took far longer than planned.", goal_allowed_s));
+         fmt::format("Given up after {:.0f} s: the way to the goal took far longer than planned.",
+                     goal_allowed_s));
   }
   return true;
 }
 
 bool PlannerTracker::State::avoiding(double now_s, const RobotState& robot) {
-  const bool driving = !moves.active() && (command.activity == Activity::kDriving || keeper.path().remaining_m() > 0.3);
+  const bool driving =
+      !moves.active() && (command.activity == Activity::kDriving || keeper.path().remaining_m() > 0.3);
   const double dithering = watch.dithering_s(now_s, robot.T_odom_base, driving, config.oscillation_distance);
   if (!moves.active()) {
-    const bool waited = blocked_since_s >= 0.0 && now_s - blocked_since_s > config.planning.controller_patience;
+    const bool waited =
+        blocked_since_s >= 0.0 && now_s - blocked_since_s > config.planning.controller_patience;
     const bool oscillating = config.oscillation_timeout > 0.0 && dithering > config.oscillation_timeout;
-    const bool stuck = outcome == PlanKeeper::Outcome::kStartBlocked && watch.without_progress_s(now_s) > config.planning.controller_patience;
+    const bool stuck = outcome == PlanKeeper::Outcome::kStartBlocked &&
+                       watch.without_progress_s(now_s) > config.planning.controller_patience;
     if (!waited && !oscillating && !stuck) return false;
     blocked_since_s = -1.0;
     watch.dithering_s(now_s, robot.T_odom_base, false, 0.0);
@@ -230,7 +253,8 @@ bool PlannerTracker::State::avoiding(double now_s, const RobotState& robot) {
                                 : "No way out of this place; trying random moves towards open space.";
     tracker.reset();
   }
-  const TrackOutput move = moves.step(input, robot.T_odom_base, [&](double bearing) { return free_way(robot, bearing, true); });
+  const TrackOutput move =
+      moves.step(input, robot.T_odom_base, [&](double bearing) { return free_way(robot, bearing, true); });
   act(Activity::kAvoiding, move);
   if (!moves.active()) {
     next_plan_s = -1.0;

@@ -9,7 +9,7 @@ namespace knav {
 namespace {
 
 constexpr int kDirections = 24;
-constexpr double kOpenEnough_m = 1.5;   ///< more open than this is not better
+constexpr double kOpenEnough_m = 1.5;  ///< more open than this is not better
 constexpr double kLongestMove_s = 8.0;
 
 }  // namespace
@@ -56,7 +56,8 @@ void RandomMoves::choose(const Pose2& T_odom_base, const FreeWay& free_way) {
   }
   while (free[chosen] <= 0.0) --chosen;
   heading_odom_rad_ = normalize_angle_rad(T_odom_base.yaw_rad + bearing[chosen]);
-  distance_m_ = std::min(random.uniform(config_.recovery.avoid_min_m, config_.recovery.avoid_max_m), free[chosen] - 0.05);
+  distance_m_ = std::min(random.uniform(config_.recovery.avoid_min_m, config_.recovery.avoid_max_m),
+                         free[chosen] - 0.05);
 }
 
 TrackOutput RandomMoves::step(const TrackInput& input, const Pose2& T_odom_base, const FreeWay& free_way) {
@@ -83,7 +84,8 @@ TrackOutput RandomMoves::step(const TrackInput& input, const Pose2& T_odom_base,
     return tracker_->stop(input);
   }
   TrackOutput out;
-  const double v = std::min(config_.tracking.slow_mps + 0.05, std::sqrt(2.0 * 0.7 * config_.acc_lim_x * left));
+  const double v =
+      std::min(config_.tracking.slow_mps + 0.05, std::sqrt(2.0 * 0.7 * config_.acc_lim_x * left));
   out.v_mps = std::min(v, std::max(0.0, input.v_mps) + config_.acc_lim_x * input.dt_s);
   out.w_radps = std::clamp(1.5 * error, -0.4, 0.4);
   return out;

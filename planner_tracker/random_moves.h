@@ -8,14 +8,15 @@
 
 namespace knav {
 
-/// The paper's reactive obstacle avoidance (section III.H): a short sequence of random rotations and translations
-/// towards open space. Same seed and situation, same moves.
+/// The paper's reactive obstacle avoidance (section III.H): a short sequence of random rotations and
+/// translations towards open space. Same seed and situation, same moves.
 class RandomMoves {
  public:
   /// How far the robot may go straight in a direction of its own frame [m].
   using FreeWay = std::function<double(double bearing_rad)>;
 
-  RandomMoves(const PlannerTrackerConfig& config, const PathTracker& tracker) : config_(config), tracker_(&tracker) {}
+  RandomMoves(const PlannerTrackerConfig& config, const PathTracker& tracker)
+      : config_(config), tracker_(&tracker) {}
 
   /// Begins a sequence. @param count of rotation and translation pairs
   void start(int count);

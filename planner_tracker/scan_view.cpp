@@ -38,7 +38,8 @@ void ScanView::place(const Pose2& T_odom_base_then, const Pose2& T_odom_base_now
   for (std::size_t i = 0; i < ranges_.range_m.size(); ++i) {
     const double r = static_cast<double>(ranges_.range_m[i]);
     if (!(r < near_m)) continue;  // NaN and +Inf as well
-    const double angle = T_now_sensor_.yaw_rad + ranges_.angle_min_rad + static_cast<double>(i) * ranges_.angle_increment_rad;
+    const double angle =
+        T_now_sensor_.yaw_rad + ranges_.angle_min_rad + static_cast<double>(i) * ranges_.angle_increment_rad;
     const int ix = g.cell_x(T_now_sensor_.x_m + r * std::cos(angle));
     const int iy = g.cell_y(T_now_sensor_.y_m + r * std::sin(angle));
     if (g.contains(ix, iy)) window_.state[g.index(ix, iy)] = CellState::kOccupied;
@@ -62,7 +63,8 @@ double ScanView::free_m(double bearing_rad, double radius_m, bool unknown_ends) 
   double free = ranges_.range_max_m;
   const double c = std::cos(bearing_rad), s = std::sin(bearing_rad);
   for (std::size_t i = 0; i < ranges_.range_m.size(); ++i) {
-    const double angle = T_now_sensor_.yaw_rad + ranges_.angle_min_rad + static_cast<double>(i) * ranges_.angle_increment_rad;
+    const double angle =
+        T_now_sensor_.yaw_rad + ranges_.angle_min_rad + static_cast<double>(i) * ranges_.angle_increment_rad;
     const double r = static_cast<double>(ranges_.range_m[i]);
     if (std::isinf(r)) continue;
     if (std::isnan(r)) {

@@ -8,8 +8,8 @@
 
 namespace knav {
 
-/// What scan_360 says about the robot's neighbourhood. REP 117: a return is an obstacle, +Inf was seen free, NaN is
-/// unknown and says nothing here; whoever asks about clearance asks the combined map as well.
+/// What scan_360 says about the robot's neighbourhood. REP 117: a return is an obstacle, +Inf was seen free,
+/// NaN is unknown and says nothing here; whoever asks about clearance asks the combined map as well.
 class ScanView {
  public:
   /// @param near_m  returns farther from the robot than this do not matter
@@ -24,7 +24,8 @@ class ScanView {
 
   /// From a point of the robot's frame to the nearest return [m]; at most the reach.
   double clearance_m(double x_m, double y_m) const;
-  /// How far a disc of this radius may go straight in a direction of the robot's frame [m] before it meets a return.
+  /// How far a disc of this radius may go straight in a direction of the robot's frame [m] before it meets a
+  /// return.
   /// @param unknown_ends  a direction with an unknown ray within 20 deg of it gives 0
   double free_m(double bearing_rad, double radius_m, bool unknown_ends) const;
 

@@ -13,10 +13,10 @@ constexpr double kKnight = 2.23606797749978970;
 }  // namespace
 
 const SearchMove kSearchMove[kSearchMoves] = {
-    {1, 0, 1.0},        {0, 1, 1.0},        {-1, 0, 1.0},        {0, -1, 1.0},
-    {1, 1, kDiagonal},  {-1, 1, kDiagonal}, {-1, -1, kDiagonal}, {1, -1, kDiagonal},
-    {2, 1, kKnight},    {1, 2, kKnight},    {-1, 2, kKnight},    {-2, 1, kKnight},
-    {-2, -1, kKnight},  {-1, -2, kKnight},  {1, -2, kKnight},    {2, -1, kKnight}};
+    {1, 0, 1.0},       {0, 1, 1.0},        {-1, 0, 1.0},        {0, -1, 1.0},
+    {1, 1, kDiagonal}, {-1, 1, kDiagonal}, {-1, -1, kDiagonal}, {1, -1, kDiagonal},
+    {2, 1, kKnight},   {1, 2, kKnight},    {-1, 2, kKnight},    {-2, 1, kKnight},
+    {-2, -1, kKnight}, {-1, -2, kKnight},  {1, -2, kKnight},    {2, -1, kKnight}};
 
 ClearancePrice::ClearancePrice(const MapLayer& layer, double hard_m, double preferred_m, double price) {
   const int cut = (layer.reach_cells + 1) * (layer.reach_cells + 1);

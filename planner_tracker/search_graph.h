@@ -15,7 +15,9 @@ class ClearancePrice {
   /// @param hard_m centre to obstacle, closed below; @param preferred_m dearer below, by up to `price`
   ClearancePrice(const MapLayer& layer, double hard_m, double preferred_m, double price);
 
-  std::uint32_t of(std::int16_t squared_cells) const { return factor_[static_cast<std::size_t>(squared_cells)]; }
+  std::uint32_t of(std::int16_t squared_cells) const {
+    return factor_[static_cast<std::size_t>(squared_cells)];
+  }
   bool open(std::int16_t squared_cells) const { return squared_cells >= hard_squared_; }
   std::int16_t hard_squared() const { return hard_squared_; }
 
@@ -30,8 +32,8 @@ struct SearchMove {
   double length;  ///< in nodes
 };
 constexpr int kSearchMoves = 16;
-/// Eight neighbours, then the eight knight's moves: paths at most 2.8 % longer than straight before they are pulled
-/// straight, instead of 8.2 %; it chooses between ways round an obstacle better.
+/// Eight neighbours, then the eight knight's moves: paths at most 2.8 % longer than straight before they are
+/// pulled straight, instead of 8.2 %; it chooses between ways round an obstacle better.
 extern const SearchMove kSearchMove[kSearchMoves];
 
 /// The cells every `stride`-th of which is a node, as a graph of 16 neighbours with costs in mm.
@@ -54,7 +56,8 @@ class SearchGraph {
   const MapLayer& layer() const { return *layer_; }
   const ClearancePrice& price() const { return *price_; }
 
-  /// Cost [mm] of a move between open nodes; 0 = not possible (off the grid, or the way or the end is closed).
+  /// Cost [mm] of a move between open nodes; 0 = not possible (off the grid, or the way or the end is
+  /// closed).
   std::uint32_t move_cost_mm(int jx, int jy, std::uint32_t from_factor, int move) const {
     const int tx = jx + kSearchMove[move].dx, ty = jy + kSearchMove[move].dy;
     if (tx < 0 || ty < 0 || tx >= width_ || ty >= height_) return 0;

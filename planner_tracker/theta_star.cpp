@@ -11,7 +11,8 @@
 
 namespace knav {
 
-double theta_star_length_m(const MapLayer& layer, double clearance_m, const Point2& start, const Point2& goal) {
+double theta_star_length_m(const MapLayer& layer, double clearance_m, const Point2& start,
+                           const Point2& goal) {
   const GridGeometry& g = layer.geometry;
   const int hard = layer.squared_for(clearance_m);
   const auto open = [&](int ix, int iy) { return layer.squared_at(ix, iy) >= hard; };
@@ -19,14 +20,16 @@ double theta_star_length_m(const MapLayer& layer, double clearance_m, const Poin
     const int steps = 2 * std::max(std::abs(bx - ax), std::abs(by - ay));
     for (int i = 0; i <= steps; ++i) {
       const double t = steps == 0 ? 0.0 : static_cast<double>(i) / steps;
-      if (!open(static_cast<int>(std::lround(ax + t * (bx - ax))), static_cast<int>(std::lround(ay + t * (by - ay))))) {
+      if (!open(static_cast<int>(std::lround(ax + t * (bx - ax))),
+                static_cast<int>(std::lround(ay + t * (by - ay))))) {
         return false;
       }
     }
     return true;
   };
   const int width = g.width_cells;
-  const int sx = g.cell_x(start.x_m), sy = g.cell_y(start.y_m), tx = g.cell_x(goal.x_m), ty = g.cell_y(goal.y_m);
+  const int sx = g.cell_x(start.x_m), sy = g.cell_y(start.y_m), tx = g.cell_x(goal.x_m),
+            ty = g.cell_y(goal.y_m);
   const double infinite = std::numeric_limits<double>::infinity();
   if (!open(sx, sy) || !open(tx, ty)) return infinite;
   std::vector<float> cost(g.cell_count(), std::numeric_limits<float>::infinity());
@@ -34,7 +37,9 @@ double theta_star_length_m(const MapLayer& layer, double clearance_m, const Poin
   std::vector<bool> closed(g.cell_count());
   using Entry = std::pair<float, int>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> list;
-  const auto between = [](int ax, int ay, int bx, int by) { return static_cast<float>(std::hypot(bx - ax, by - ay)); };
+  const auto between = [](int ax, int ay, int bx, int by) {
+    return static_cast<float>(std::hypot(bx - ax, by - ay));
+  };
   const int first = sy * width + sx;
   cost[g.index(sx, sy)] = 0.0f;
   parent[g.index(sx, sy)] = first;

@@ -37,7 +37,8 @@ void TruncatedDistance::update(int width, int height, const std::uint8_t* cells,
   run_.assign(static_cast<std::size_t>(wide), 0);
 
   const auto sweep_row = [&](int y) {
-    const std::uint8_t* cell = cells + static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + first_column;
+    const std::uint8_t* cell =
+        cells + static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + first_column;
     std::int16_t* run = run_.data();
     for (int x = in0; x < in1; ++x) {
       const auto next = std::min(static_cast<std::int16_t>(run[x] + 1), far);

@@ -19,9 +19,10 @@ struct CellWindow {
   void include(int ix, int iy);
 };
 
-/// Exact squared Euclidean distance in cells to the nearest blocked cell, cut at (reach + 1)^2. The same numbers as
-/// core's euclidean_distance_m() as far as it reaches, but of a window of a larger grid, on 16-bit integers that the
-/// compiler vectorises: 14 ms instead of 82 ms for 3.7 million cells at a reach of 14 (benchmark_planner).
+/// Exact squared Euclidean distance in cells to the nearest blocked cell, cut at (reach + 1)^2. The same
+/// numbers as core's euclidean_distance_m() as far as it reaches, but of a window of a larger grid, on 16-bit
+/// integers that the compiler vectorises: 14 ms instead of 82 ms for 3.7 million cells at a reach of 14
+/// (benchmark_planner).
 class TruncatedDistance {
  public:
   explicit TruncatedDistance(int reach_cells);
@@ -29,7 +30,8 @@ class TruncatedDistance {
   int reach_cells() const { return reach_; }
   std::int16_t cut() const { return cut_; }
 
-  /// Recomputes `squared` in the window, which is clipped to the grid. What lies off the grid counts as blocked.
+  /// Recomputes `squared` in the window, which is clipped to the grid. What lies off the grid counts as
+  /// blocked.
   /// @param cells [width x height], row-major; every value but `open` is blocked
   void update(int width, int height, const std::uint8_t* cells, std::uint8_t open, const CellWindow& window,
               std::int16_t* squared);

@@ -16,7 +16,8 @@ namespace {
 /// Empty where the floor plan is absent.
 OccupancyGrid hospital() {
   const char* folder = std::getenv("KINECT_NAV_REALDATA");
-  const std::string path = (folder ? std::string(folder) : KINECT_NAV_SOURCE_DIR "/../shared/realdata") + "/maps/stage/hospital.png";
+  const std::string path = (folder ? std::string(folder) : KINECT_NAV_SOURCE_DIR "/../shared/realdata") +
+                           "/maps/stage/hospital.png";
   const cv::Mat image = cv::imread(path, cv::IMREAD_GRAYSCALE);
   OccupancyGrid grid;
   grid.geometry = {image.cols, image.rows, 0.0456, 0.0, 0.0};
@@ -35,7 +36,8 @@ bool skip(benchmark::State& state, const OccupancyGrid& grid) {
   return true;
 }
 
-void set_up(const PlannerTrackerConfig& config, const OccupancyGrid& grid, CombinedMap* map, GridPlanner* planner) {
+void set_up(const PlannerTrackerConfig& config, const OccupancyGrid& grid, CombinedMap* map,
+            GridPlanner* planner) {
   map->set_global({}, grid, {});
   planner->set_map(map->global());
   (void)config;
@@ -50,7 +52,8 @@ void ClearanceOfWholeMap(benchmark::State& state) {
   TruncatedDistance truncated(14);
   std::vector<std::int16_t> squared(grid.value.size());
   for (auto _ : state) {
-    if (core) benchmark::DoNotOptimize(euclidean_distance_m(grid.geometry, blocked));
+    if (core)
+      benchmark::DoNotOptimize(euclidean_distance_m(grid.geometry, blocked));
     else {
       truncated.update(grid.geometry.width_cells, grid.geometry.height_cells, blocked.data(), 0,
                        {0, 0, grid.geometry.width_cells, grid.geometry.height_cells}, squared.data());
@@ -69,7 +72,8 @@ void OverlayOf20mLocalMap(benchmark::State& state) {
   OccupancyGrid local;
   local.geometry = {400, 400, 0.05, -10.0, -10.0};
   RandomStream random(1, random_stream::kTest, 0, 0);
-  for (int i = 0; i < 160000; ++i) local.value.push_back(static_cast<std::int8_t>(random.uniform() < 0.05 ? 100 : 0));
+  for (int i = 0; i < 160000; ++i)
+    local.value.push_back(static_cast<std::int8_t>(random.uniform() < 0.05 ? 100 : 0));
   double x = 40.0;
   for (auto _ : state) map.set_local(local, {x = x < 90.0 ? x + 0.13 : 40.0, 18.0, 0.01 * x});
 }

@@ -15,12 +15,18 @@ TEST(Overlay, EveryCombinationOfGlobalAndLocal) {
   const struct {
     S global, local, combined;
   } table[] = {
-      {S::kUnknown, S::kUnknown, S::kUnknown},   {S::kUnknown, S::kFree, S::kFree},
-      {S::kUnknown, S::kOccupied, S::kOccupied}, {S::kFree, S::kUnknown, S::kFree},
-      {S::kFree, S::kFree, S::kFree},            {S::kFree, S::kOccupied, S::kOccupied},
-      {S::kOccupied, S::kUnknown, S::kOccupied}, {S::kOccupied, S::kFree, S::kFree},
-      {S::kOccupied, S::kOccupied, S::kOccupied}, {S::kKeepout, S::kUnknown, S::kKeepout},
-      {S::kKeepout, S::kFree, S::kKeepout},      {S::kKeepout, S::kOccupied, S::kKeepout},
+      {S::kUnknown, S::kUnknown, S::kUnknown},
+      {S::kUnknown, S::kFree, S::kFree},
+      {S::kUnknown, S::kOccupied, S::kOccupied},
+      {S::kFree, S::kUnknown, S::kFree},
+      {S::kFree, S::kFree, S::kFree},
+      {S::kFree, S::kOccupied, S::kOccupied},
+      {S::kOccupied, S::kUnknown, S::kOccupied},
+      {S::kOccupied, S::kFree, S::kFree},
+      {S::kOccupied, S::kOccupied, S::kOccupied},
+      {S::kKeepout, S::kUnknown, S::kKeepout},
+      {S::kKeepout, S::kFree, S::kKeepout},
+      {S::kKeepout, S::kOccupied, S::kKeepout},
   };
   for (const auto& row : table) EXPECT_EQ(overlay(row.global, row.local), row.combined);
   // The same through the grids: one cell a row of the table.
@@ -99,7 +105,8 @@ TEST(Overlay, IncrementalClearanceEqualsThatOfAFreshMap) {
     for (int y = 0; y < global.geometry.height_cells; ++y) {
       for (int x = 0; x < global.geometry.width_cells; ++x) {
         const double cells = static_cast<double>(exact_m[framed.index(x + 1, y + 1)]) / 0.05;
-        const long squared = std::min(std::lround(cells * cells), static_cast<long>((reach + 1) * (reach + 1)));
+        const long squared =
+            std::min(std::lround(cells * cells), static_cast<long>((reach + 1) * (reach + 1)));
         ASSERT_EQ(map.combined().squared_at(x, y), squared) << x << "," << y << " round " << round;
       }
     }

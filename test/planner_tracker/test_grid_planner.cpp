@@ -10,7 +10,8 @@ namespace knav {
 namespace {
 
 struct Fixture {
-  explicit Fixture(const OccupancyGrid& grid, const OccupancyGrid& keepout = {}, const PlannerTrackerConfig& c = {})
+  explicit Fixture(const OccupancyGrid& grid, const OccupancyGrid& keepout = {},
+                   const PlannerTrackerConfig& c = {})
       : config(c), map(c.preferred_radius_m() + 0.2, 65, 25), planner(c) {
     map.set_global({}, grid, keepout);
     planner.set_map(map.global());
@@ -25,7 +26,8 @@ struct Fixture {
   GridPlanner planner;
 };
 
-/// Samples far finer than a cell: all over free cells, and no nearer to anything than the hard radius less a cell.
+/// Samples far finer than a cell: all over free cells, and no nearer to anything than the hard radius less a
+/// cell.
 void expect_safe(const MapLayer& layer, const std::vector<Point2>& path, double hard_m) {
   ASSERT_GE(path.size(), 1u);
   for (std::size_t i = 1; i < path.size(); ++i) {
@@ -56,8 +58,9 @@ TEST(GridPlanner, RoundAWallItIsTheTautStringAtThePreferredClearance) {
   const PlanResult plan = f.plan({2.0, 2.0}, {8.0, 2.0});
   ASSERT_EQ(plan.code, PlanCode::kOk);
   expect_safe(f.map.combined(), plan.path, f.config.hard_radius_m());
-  // By hand: a tangent to the circle of radius r round the corner (4.9, 5), its arc up to the top, 0.2 m across, and
-  // the same down again. The heading turns from (direction to the corner) + asin(r / d) to 0, and so does the arc.
+  // By hand: a tangent to the circle of radius r round the corner (4.9, 5), its arc up to the top, 0.2 m
+  // across, and the same down again. The heading turns from (direction to the corner) + asin(r / d) to 0, and
+  // so does the arc.
   const auto taut = [](double r) {
     const double d = std::hypot(2.9, 3.0);
     return 2.0 * (std::sqrt(d * d - r * r) + r * (std::atan2(3.0, 2.9) + std::asin(r / d))) + 0.2;
@@ -75,12 +78,13 @@ TEST(GridPlanner, NeverThroughAWallOrUnknownAndNearTheShortestOnRandomGrids) {
     for (int i = 0; i < 26; ++i) {
       const double x = random.uniform(0.5, 11.0), y = random.uniform(0.5, 8.0);
       const bool wide = random.uniform() < 0.5;
-      fill(&grid, x, y, x + (wide ? random.uniform(0.2, 2.5) : 0.1), y + (wide ? 0.1 : random.uniform(0.2, 2.5)),
-           random.uniform() < 0.3 ? -1 : 100);
+      fill(&grid, x, y, x + (wide ? random.uniform(0.2, 2.5) : 0.1),
+           y + (wide ? 0.1 : random.uniform(0.2, 2.5)), random.uniform() < 0.3 ? -1 : 100);
     }
     Fixture f(grid);
     for (int pair = 0; pair < 8; ++pair) {
-      const Point2 a{random.uniform(0.3, 11.7), random.uniform(0.3, 8.7)}, b{random.uniform(0.3, 11.7), random.uniform(0.3, 8.7)};
+      const Point2 a{random.uniform(0.3, 11.7), random.uniform(0.3, 8.7)},
+          b{random.uniform(0.3, 11.7), random.uniform(0.3, 8.7)};
       if (!f.planner.open(f.map.combined(), a) || !f.planner.open(f.map.combined(), b)) continue;
       const PlanResult plan = f.plan(a, b);
       const double reference = theta_star_length_m(f.map.combined(), f.config.hard_radius_m(), a, b);
@@ -114,7 +118,8 @@ TEST(GridPlanner, WithoutAPriceOnClearanceItIsWithin3PercentOfTheShortest) {
     }
     Fixture f(grid, {}, config);
     for (int pair = 0; pair < 8; ++pair) {
-      const Point2 a{random.uniform(0.3, 11.7), random.uniform(0.3, 8.7)}, b{random.uniform(0.3, 11.7), random.uniform(0.3, 8.7)};
+      const Point2 a{random.uniform(0.3, 11.7), random.uniform(0.3, 8.7)},
+          b{random.uniform(0.3, 11.7), random.uniform(0.3, 8.7)};
       const double reference = theta_star_length_m(f.map.combined(), f.config.hard_radius_m(), a, b);
       if (!std::isfinite(reference) || reference < 1.0) continue;
       ++reached;

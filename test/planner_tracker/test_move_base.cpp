@@ -42,12 +42,13 @@ class FakeRobot {
     odom_pub_ = nh.advertise<nav_msgs::Odometry>("odom", 10);
     scan_pub_ = nh.advertise<sensor_msgs::LaserScan>("scan_360", 5);
     status_pub_ = nh.advertise<kinect_nav::LocalizationStatus>("localization_status", 5);
-    cmd_sub_ = nh.subscribe<geometry_msgs::Twist>("cmd_vel", 10, [this](const geometry_msgs::Twist::ConstPtr& twist) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      v_ = twist->linear.x;
-      w_ = twist->angular.z;
-      ++commands;
-    });
+    cmd_sub_ = nh.subscribe<geometry_msgs::Twist>("cmd_vel", 10,
+                                                  [this](const geometry_msgs::Twist::ConstPtr& twist) {
+                                                    const std::lock_guard<std::mutex> lock(mutex_);
+                                                    v_ = twist->linear.x;
+                                                    w_ = twist->angular.z;
+                                                    ++commands;
+                                                  });
     nav_msgs::OccupancyGrid map;
     occupancy_message(room(kWidth_m, kHeight_m), &map);
     map.header.frame_id = "map";
@@ -155,7 +156,8 @@ class MoveBase : public testing::Test {
   void SetUp() override {
     ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
     failure_sub = nh.subscribe<kinect_nav::NavigationFailure>(
-        "navigation_failure", 10, [this](const kinect_nav::NavigationFailure::ConstPtr& m) { code = m->code; });
+        "navigation_failure", 10,
+        [this](const kinect_nav::NavigationFailure::ConstPtr& m) { code = m->code; });
     ros::Duration(1.0).sleep();  // connections, the map
   }
   bool wait_for(const std::function<bool()>& what, double longest_s) {
@@ -182,8 +184,8 @@ class MoveBase : public testing::Test {
 
 TEST_F(MoveBase, ReachesAGoalAndThenStands) {
   std::atomic<int> plans{0};
-  const ros::Subscriber plan_sub =
-      nh.subscribe<nav_msgs::Path>("plan", 5, [&](const nav_msgs::Path::ConstPtr& m) { plans += !m->poses.empty(); });
+  const ros::Subscriber plan_sub = nh.subscribe<nav_msgs::Path>(
+      "plan", 5, [&](const nav_msgs::Path::ConstPtr& m) { plans += !m->poses.empty(); });
   const Pose2 goal{4.0, 2.5, 1.0};
   client.sendGoal(goal_at(goal));
   ASSERT_TRUE(client.waitForResult(ros::Duration(25.0)));

@@ -30,7 +30,8 @@ TEST(Drive, SeveralGoalsThroughDoorsAtSpeedWithoutTouching) {
   const OccupancyGrid grid = two_rooms();
   ToyWorld world(grid, grid, {1.0, 1.0, 2.0});
   const double began_s = world.now_s;
-  for (const Pose2& goal : {Pose2{10.5, 4.5, 1.0}, Pose2{1.0, 5.0, -2.0}, Pose2{11.0, 1.0, 3.1}, Pose2{3.0, 3.0, 0.0}}) {
+  for (const Pose2& goal :
+       {Pose2{10.5, 4.5, 1.0}, Pose2{1.0, 5.0, -2.0}, Pose2{11.0, 1.0, 3.1}, Pose2{3.0, 3.0, 0.0}}) {
     ASSERT_TRUE(world.planner.set_goal(goal));
     const Command command = world.run(90.0);
     ASSERT_EQ(command.activity, Activity::kReached) << world.planner.failure().reason;
@@ -41,9 +42,11 @@ TEST(Drive, SeveralGoalsThroughDoorsAtSpeedWithoutTouching) {
   EXPECT_LE(world.reversals, 2);
   EXPECT_LE(world.max_v_mps, 0.6 + 1e-9);
   EXPECT_LE(world.max_w_radps, 1.2 + 1e-9);
-  EXPECT_GT(world.driven_m / (world.now_s - began_s), 0.40) << "mean speed, turns and four alignments included";
+  EXPECT_GT(world.driven_m / (world.now_s - began_s), 0.40)
+      << "mean speed, turns and four alignments included";
   EXPECT_LT(world.planner_ms / world.steps, 3.0) << "CPU time of a control step [ms], planning included";
-  std::printf("mean speed %.3f m/s, %.3f ms a step\n", world.driven_m / (world.now_s - began_s), world.planner_ms / world.steps);
+  std::printf("mean speed %.3f m/s, %.3f ms a step\n", world.driven_m / (world.now_s - began_s),
+              world.planner_ms / world.steps);
   RecordProperty("mean_speed_mps", std::to_string(world.driven_m / (world.now_s - began_s)));
 }
 
@@ -191,7 +194,8 @@ TEST(Obstacles, WalkersAreNotRunInto) {
       at[i] = next;
       if (at[i].y_m < 0.5 || at[i].y_m > 5.5) speed[i].y_m = std::copysign(speed[i].y_m, 3.0 - at[i].y_m);
       const double left = i == 0 ? 0.5 : 6.5, right = i == 0 ? 5.5 : 11.5;
-      if (at[i].x_m < left || at[i].x_m > right) speed[i].x_m = std::copysign(speed[i].x_m, 0.5 * (left + right) - at[i].x_m);
+      if (at[i].x_m < left || at[i].x_m > right)
+        speed[i].x_m = std::copysign(speed[i].x_m, 0.5 * (left + right) - at[i].x_m);
     }
   };
   for (std::size_t i = 0; i < at.size(); ++i) {
@@ -200,7 +204,8 @@ TEST(Obstacles, WalkersAreNotRunInto) {
       return at[i];
     }});
   }
-  for (const Pose2& goal : {Pose2{10.5, 4.5, 1.0}, Pose2{1.0, 5.0, -2.0}, Pose2{11.0, 1.0, 3.1}, Pose2{2.0, 2.0, 0.0}}) {
+  for (const Pose2& goal :
+       {Pose2{10.5, 4.5, 1.0}, Pose2{1.0, 5.0, -2.0}, Pose2{11.0, 1.0, 3.1}, Pose2{2.0, 2.0, 0.0}}) {
     world.planner.set_goal(goal);
     EXPECT_EQ(world.run(150.0).activity, Activity::kReached) << world.planner.failure().reason;
   }
@@ -320,6 +325,17 @@ TEST(Safety, StaleOdometryPoseOrLocalizerStopEachWithItsOwnReason) {
   const Command cancelled = planner.step(t + 0.05, at(t + 0.05));
   EXPECT_EQ(cancelled.v_mps, 0.0);
   EXPECT_EQ(cancelled.activity, Activity::kIdle);
+}
+
+TEST(Safety, SurroundedByUnknownTheRobotDoesNotDriveIntoIt) {
+  OccupancyGrid map = room(8.0, 6.0);
+  fill(&map, 1.0, 1.0, 5.0, 5.0, -1);
+  ToyWorld world(room(8.0, 6.0), map, {3.0, 3.0, 0.0});
+  world.memory_range_m = 0.0;  // and nothing is seen
+  world.planner.set_goal({7.0, 3.0, 0.0});
+  EXPECT_EQ(world.run(100.0).activity, Activity::kFailed);
+  EXPECT_EQ(world.planner.failure().code, FailureCode::kStartOccupied);
+  EXPECT_LT(world.distance_to({3.0, 3.0, 0.0}), 0.25);
 }
 
 TEST(Safety, AClockThatJumpsBackEndsTheGoal) {

@@ -31,8 +31,8 @@ inline OccupancyGrid grid_from_text(const std::vector<std::string>& rows, double
 /// A free room with walls one cell thick round it.
 inline OccupancyGrid room(double width_m, double height_m, double resolution_m = 0.05) {
   OccupancyGrid grid;
-  grid.geometry = {static_cast<int>(std::lround(width_m / resolution_m)), static_cast<int>(std::lround(height_m / resolution_m)),
-                   resolution_m, 0.0, 0.0};
+  grid.geometry = {static_cast<int>(std::lround(width_m / resolution_m)),
+                   static_cast<int>(std::lround(height_m / resolution_m)), resolution_m, 0.0, 0.0};
   grid.value.assign(grid.geometry.cell_count(), 0);
   for (int y = 0; y < grid.geometry.height_cells; ++y) {
     for (int x = 0; x < grid.geometry.width_cells; ++x) {
@@ -58,12 +58,13 @@ struct Disc {
   double radius_m = 0.25;
 };
 
-/// A robot with a camera of 57 deg and a memory of what it saw, in a flat world of cells and discs. What the mapper
-/// does is done exactly: cells on rays of the view become free or occupied, all others keep what they were, and
-/// scan_360 is cast through that memory.
+/// A robot with a camera of 57 deg and a memory of what it saw, in a flat world of cells and discs. What the
+/// mapper does is done exactly: cells on rays of the view become free or occupied, all others keep what they
+/// were, and scan_360 is cast through that memory.
 class ToyWorld {
  public:
-  ToyWorld(const OccupancyGrid& truth, const OccupancyGrid& map, const Pose2& start, const PlannerTrackerConfig& config = {})
+  ToyWorld(const OccupancyGrid& truth, const OccupancyGrid& map, const Pose2& start,
+           const PlannerTrackerConfig& config = {})
       : truth_(truth), T_map_base(start), planner(config), config_(config) {
     memory_ = truth;
     memory_.value.assign(truth.value.size(), -1);
@@ -94,7 +95,8 @@ class ToyWorld {
     robot.localization_stamp_s = now_s;
     robot.pose_stamp_s = now_s;
     RandomStream noise(7, random_stream::kTest, static_cast<std::uint64_t>(frame_), 0);
-    const Pose2 error{noise.normal(0.0, pose_noise_m), noise.normal(0.0, pose_noise_m), noise.normal(0.0, 0.3 * pose_noise_m)};
+    const Pose2 error{noise.normal(0.0, pose_noise_m), noise.normal(0.0, pose_noise_m),
+                      noise.normal(0.0, 0.3 * pose_noise_m)};
     robot.T_map_base = T_map_base * error;
     if (sensor_alive) {
       if (frame_ % 2 == 0) look();
@@ -134,7 +136,9 @@ class ToyWorld {
  private:
   void move(double dt) {
     // The base's own limits, a little above the planner's.
-    const auto limit = [](double from, double to, double step) { return std::max(from - step, std::min(from + step, to)); };
+    const auto limit = [](double from, double to, double step) {
+      return std::max(from - step, std::min(from + step, to));
+    };
     v_mps = limit(v_mps, command_v_, 1.0 * dt);
     w_radps = limit(w_radps, command_w_, 4.0 * dt);
     const double middle = T_map_base.yaw_rad + 0.5 * w_radps * dt;
@@ -146,7 +150,8 @@ class ToyWorld {
     const GridGeometry& g = truth_.geometry;
     const int ix = g.cell_x(T_map_base.x_m), iy = g.cell_y(T_map_base.y_m);
     // Cell centre to cell centre, less half a cell at each end.
-    const double wall = g.contains(ix, iy) ? static_cast<double>(clearance_m_[g.index(ix, iy)]) - 0.5 * g.resolution_m : 0.0;
+    const double wall =
+        g.contains(ix, iy) ? static_cast<double>(clearance_m_[g.index(ix, iy)]) - 0.5 * g.resolution_m : 0.0;
     least_clearance_m = std::min(least_clearance_m, wall);
     if (wall + 0.5 * g.resolution_m < config_.robot_radius) touching = true;
     for (const Disc& disc : discs) {
@@ -177,7 +182,7 @@ class ToyWorld {
     std::vector<std::size_t> hits;
     for (int i = 0; i <= 200; ++i) {
       const double angle = T_map_base.yaw_rad - half + 2.0 * half * i / 200.0;
-      for (double r = 0.02; r < 8.0; r += 0.6 * g.resolution_m) {
+      for (double r = 0.02; r < memory_range_m; r += 0.6 * g.resolution_m) {
         const double x = T_map_base.x_m + r * std::cos(angle), y = T_map_base.y_m + r * std::sin(angle);
         const int ix = g.cell_x(x), iy = g.cell_y(y);
         if (!g.contains(ix, iy)) break;
@@ -205,7 +210,8 @@ class ToyWorld {
       float& range = scan.range_m[static_cast<std::size_t>(i)];
       range = std::numeric_limits<float>::infinity();
       for (double r = 0.05; r < scan.range_max_m; r += 0.6 * g.resolution_m) {
-        const int ix = g.cell_x(T_map_base.x_m + r * std::cos(angle)), iy = g.cell_y(T_map_base.y_m + r * std::sin(angle));
+        const int ix = g.cell_x(T_map_base.x_m + r * std::cos(angle)),
+                  iy = g.cell_y(T_map_base.y_m + r * std::sin(angle));
         const int value = g.contains(ix, iy) ? memory_.value[g.index(ix, iy)] : -1;
         if (value > 50) range = static_cast<float>(r);
         if (value < 0 && r > 1.0) range = std::numeric_limits<float>::quiet_NaN();
@@ -242,6 +248,7 @@ class ToyWorld {
   LocalizationState localization = LocalizationState::kOk;
   std::vector<Disc> discs;
   bool sensor_alive = true;
+  double memory_range_m = 8.0;
   double pose_noise_m = 0.005;
   double now_s = 100.0, v_mps = 0.0, w_radps = 0.0;
 
