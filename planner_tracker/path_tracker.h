@@ -56,8 +56,8 @@ class PathTracker {
 
  private:
   /// True off the cells the map calls free. A robot that stands in the midst of unknown keeps clearance 0
-  /// wherever it goes, so that a rule of not coming nearer would not hold it. Under the footprint anything
-  /// may be: it stands there.
+  /// wherever it goes, so that a rule of not coming nearer would not hold it. Half its radius is let pass (it
+  /// stands there), too little to creep on by.
   bool unknown_ground(const TrackInput& input, double x_m, double y_m) const;
   double approach(double from, double to, double step) const;
 
