@@ -87,13 +87,24 @@ void DepthCalibrator::average_tiles() {
   for (int r = 0; r < layout_.rows(); ++r) {
     for (int c = 0; c < layout_.columns(); ++c) {
       values.clear();
+      double half_sum[2] = {0.0, 0.0}, half_count[2] = {0.0, 0.0};
       for (int v = r * config_.tile_px; v < std::min(frame_.rows, (r + 1) * config_.tile_px); ++v) {
+        const int half = 2 * (v - r * config_.tile_px) < config_.tile_px ? 0 : 1;
         for (int u = c * config_.tile_px; u < std::min(frame_.cols, (c + 1) * config_.tile_px); ++u) {
           const float z = frame_.at<float>(v, u);
-          if (z > 0.0f) values.push_back(1.0 / z);
+          if (!(z > 0.0f)) continue;
+          values.push_back(1.0 / z);
+          half_sum[half] += 1.0 / z;
+          half_count[half] += 1.0;
         }
       }
       if (values.size() < static_cast<std::size_t>(config_.tile_px * config_.tile_px) / 4 + 1) continue;
+      // Floor comes nearer by a code or more with every row; a wall 7 degrees off square, by 0.15.
+      if (half_count[0] > 0.0 && half_count[1] > 0.0 &&
+          std::abs(half_sum[0] / half_count[0] - half_sum[1] / half_count[1]) >
+              0.15 * config_.tile_px * kInverseDepthPerCode) {
+        continue;
+      }
       // The mean near the median: a median alone would be rounded to a whole code.
       const double median = median_of(&values);
       double sum = 0.0, near = 0.0;
@@ -184,16 +195,25 @@ DepthCalibration DepthCalibrator::fit() {
 }
 
 void DepthCalibrator::fit_offsets(DepthCalibration* calibration) const {
+  std::vector<double> values;
   for (std::size_t tile = 0; tile < calibration->tile_count(); ++tile) {
-    double offset = 0.0;
-    for (int round = 0; round < 3; ++round) {
+    // From the median on: a distance at which something else stood before the wall must not drag the rest
+    // along.
+    values.clear();
+    for (const Wall& wall : walls_) {
+      if (!wall.has(tile)) continue;
+      values.push_back(true_per_m(wall, tile) -
+                       (1.0 + calibration->inverse_depth_scale) * wall.measured_per_m(tile));
+    }
+    double offset = values.empty() ? 0.0 : median_of(&values);
+    for (int round = 0; round < 4; ++round) {
       double weights = 0.0, sum = 0.0;
       for (const Wall& wall : walls_) {
         if (!wall.has(tile)) continue;
         const double value =
             true_per_m(wall, tile) - (1.0 + calibration->inverse_depth_scale) * wall.measured_per_m(tile);
-        const double w =
-            weight(wall) * (round == 0 ? 1.0 : huber((value - offset) * std::sqrt(weight(wall)), 2.5));
+        const double robust = huber((value - offset) * std::sqrt(weight(wall)), 2.5);
+        const double w = weight(wall) * robust * robust;
         weights += w;
         sum += w * value;
       }
