@@ -10,8 +10,8 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-/// Visits the cells on a ray in order (Amanatides and Woo). Quad (ix, iy) spans four cell centres, and the dual
-/// grid of these quads is walked, so that F is continuous along the ray and one word serves each step.
+/// Visits the cells on a ray in order (Amanatides and Woo). Quad (ix, iy) spans four cell centres, and the
+/// dual grid of these quads is walked, so that F is continuous along the ray and one word serves each step.
 class QuadWalk {
  public:
   QuadWalk(double x, double y, double dir_x, double dir_y) {  // in cells, quads' corners at integers
@@ -83,7 +83,9 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
   const auto inside = static_cast<unsigned>(grid.size_cells() - 1);
   const int first_x = grid.first_x(), first_y = grid.first_y();
   while (entered < length) {
-    if (static_cast<unsigned>(walk.ix - first_x) >= inside || static_cast<unsigned>(walk.iy - first_y) >= inside) break;
+    if (static_cast<unsigned>(walk.ix - first_x) >= inside ||
+        static_cast<unsigned>(walk.iy - first_y) >= inside)
+      break;
     const double leaves = std::min(walk.leaves_at(), length);
     const std::uint32_t quad = quads[grid.index(walk.ix, walk.iy)];
     if (quad == kAllFree) {
@@ -96,7 +98,8 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
     } else {
       // The middle and the far edge of the ray's way through the quad.
       for (const double t : {0.5 * (entered + leaves), leaves}) {
-        const auto tx = static_cast<float>(x + t * dir_x - walk.ix), ty = static_cast<float>(y + t * dir_y - walk.iy);
+        const auto tx = static_cast<float>(x + t * dir_x - walk.ix),
+                   ty = static_cast<float>(y + t * dir_y - walk.iy);
         const float value = value_in(quad, tx, ty);
         if (value > 0.0f) {
           positive_at = t;

@@ -25,13 +25,14 @@ struct ContourConfig {
     v.number("unknown_gap_m", unknown_gap_m, 0, 2, "m", "A ray may cross unknown cells for this length.");
     v.number("evidence_decay_s", evidence_decay_s, 0.1, 10000, "s",
              "A ray's evidence is exp(-age / this), age by the window's clock.");
-    v.flag("merge_newest", merge_newest, "Replace the section that the newest profile covers by its readings.");
+    v.flag("merge_newest", merge_newest,
+           "Replace the section that the newest profile covers by its readings.");
   }
 };
 
-/// Paper section III.F: the surface seen from a pose. Every cell on each ray is visited, the crossing from positive
-/// to negative located by interpolation. Ray i points to the angle -pi + i 2 pi / rays in the robot's frame. A
-/// return in metres; +Inf = known free up to range_max; NaN = unknown.
+/// Paper section III.F: the surface seen from a pose. Every cell on each ray is visited, the crossing from
+/// positive to negative located by interpolation. Ray i points to the angle -pi + i 2 pi / rays in the
+/// robot's frame. A return in metres; +Inf = known free up to range_max; NaN = unknown.
 /// @param now_age_clock_s the window's clock now, for the evidence
 void extract_contour(const TsdfGrid& grid, const ContourConfig& config, const Pose2& T_map_robot,
                      float now_age_clock_s, RangeScan* scan);
@@ -45,9 +46,9 @@ struct RayEnd {
 RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, double y_m, double dir_x,
                 double dir_y, double length_m);
 
-/// Section III.H: replaces the section of the scan that the newest observation covers, after converting it from its
-/// own pose and columns to the robot's frame and angles. Between columns of one surface it is interpolated; columns
-/// without a return keep what the map says. Evidence there becomes 1.
+/// Section III.H: replaces the section of the scan that the newest observation covers, after converting it
+/// from its own pose and columns to the robot's frame and angles. Between columns of one surface it is
+/// interpolated; columns without a return keep what the map says. Evidence there becomes 1.
 void merge_newest(const TsdfObservation& observation, const Pose2& T_map_robot, RangeScan* scan);
 
 }  // namespace knav

@@ -1,5 +1,6 @@
 #include "core/tsdf_alignment.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/multiversion.h"
@@ -17,8 +18,8 @@ struct Window {
 
 /// Costs of the readings seen from one pose: (x, y) = (x0 + c px - s py, y0 + s px + c py), in cells.
 KNAV_MULTIVERSION
-void reading_costs(const Window& window, float x0, float y0, float c, float s, const float* px, const float* py,
-                   const float* weight, int count, float* out) {
+void reading_costs(const Window& window, float x0, float y0, float c, float s, const float* px,
+                   const float* py, const float* weight, int count, float* out) {
   const float last = static_cast<float>(window.size - 1);
   const int bits = window.bits, mask = window.mask, first_x = window.first_x, first_y = window.first_y;
   const float price = window.price;
@@ -75,10 +76,30 @@ void tsdf_alignment_costs(const TsdfGrid& grid, const WeightedPoints& points, co
     const Pose2 T = particles.pose(i);
     const auto x0 = static_cast<float>(T.x_m * scale - 0.5 - grid.first_x());
     const auto y0 = static_cast<float>(T.y_m * scale - 0.5 - grid.first_y());
-    const auto c = static_cast<float>(std::cos(T.yaw_rad) * scale), s = static_cast<float>(std::sin(T.yaw_rad) * scale);
+    const auto c = static_cast<float>(std::cos(T.yaw_rad) * scale),
+               s = static_cast<float>(std::sin(T.yaw_rad) * scale);
     reading_costs(window, x0, y0, c, s, points.x_m.data(), points.y_m.data(), points.weight.data(), count,
                   scratch.data());
     (*cost)[i] = sum_of(scratch.data(), count) * to_mean;
+  }
+}
+
+void weigh_by_known_share(const TsdfGrid& grid, const ParticleSet& particles, int hypotheses,
+                          WeightedPoints* points) {
+  const std::size_t count = std::min(particles.size(), static_cast<std::size_t>(std::max(1, hypotheses)));
+  std::fill(points->weight.begin(), points->weight.end(), 0.0f);
+  for (std::size_t h = 0; h < count; ++h) {
+    const Pose2 T = particles.pose(h * particles.size() / count);
+    const double c = std::cos(T.yaw_rad), s = std::sin(T.yaw_rad);
+    for (std::size_t k = 0; k < points->size(); ++k) {
+      const double x = points->x_m[k], y = points->y_m[k];
+      const int ix = grid.cell_of(T.x_m + c * x - s * y), iy = grid.cell_of(T.y_m + s * x + c * y);
+      if (grid.contains(ix, iy) && grid.known(ix, iy)) points->weight[k] += 1.0f;
+    }
+  }
+  for (float& w : points->weight) {
+    const float share = w / static_cast<float>(count);
+    w = share * share;
   }
 }
 

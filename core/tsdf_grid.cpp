@@ -11,15 +11,16 @@ namespace {
 
 /// Which column of the observation sees a cell, and how far the cell is. The first part of equation 3.
 struct RowProjection {
-  float cos_yaw, sin_yaw;        ///< of the sensor
-  float resolution, first_dx;    ///< dx of cell k is first_dx + resolution k
+  float cos_yaw, sin_yaw;      ///< of the sensor
+  float resolution, first_dx;  ///< dx of cell k is first_dx + resolution k
   float dy;
   float column_scale, column_shift;
   int columns;
 };
 
 KNAV_MULTIVERSION
-void project_row_pinhole(const RowProjection& p, int first, int count, std::int32_t* column, float* distance) {
+void project_row_pinhole(const RowProjection& p, int first, int count, std::int32_t* column,
+                         float* distance) {
   const auto columns = static_cast<float>(p.columns);
   for (int k = 0; k < count; ++k) {
     const float dx = p.first_dx + p.resolution * static_cast<float>(first + k);
@@ -35,8 +36,8 @@ void project_row_pinhole(const RowProjection& p, int first, int count, std::int3
   }
 }
 
-/// atan2 to about 1e-5 rad of every cell of the row, written so that every target computes the same bytes. In passes
-/// without branches, which the compiler turns into vector code.
+/// atan2 to about 1e-5 rad of every cell of the row, written so that every target computes the same bytes. In
+/// passes without branches, which the compiler turns into vector code.
 KNAV_MULTIVERSION
 void project_row_angular(const RowProjection& p, int first, int count, std::int32_t* column, float* distance,
                          float* angle) {
@@ -48,7 +49,8 @@ void project_row_angular(const RowProjection& p, int first, int count, std::int3
     const float low = ax < ay ? ax : ay, high = ax < ay ? ay : ax;
     const float t = low / (high + 1e-12f);
     const float t2 = t * t;
-    const float a = ((((-0.0117212f * t2 + 0.05265332f) * t2 - 0.11643287f) * t2 + 0.19354346f) * t2 - 0.33262347f) * t2;
+    const float a =
+        ((((-0.0117212f * t2 + 0.05265332f) * t2 - 0.11643287f) * t2 + 0.19354346f) * t2 - 0.33262347f) * t2;
     const float octant = (a + 0.99997726f) * t;
     // Mirrored as the signs say, by arithmetic: 1 or 0 each.
     const float steep = static_cast<float>(ay > ax), backward = static_cast<float>(x < 0.0f);
@@ -61,7 +63,8 @@ void project_row_angular(const RowProjection& p, int first, int count, std::int3
   const float turn = 6.28318530718f * std::fabs(p.column_scale);
   for (int k = 0; k < count; ++k) {
     float u = p.column_shift + p.column_scale * angle[k];
-    u += turn * (static_cast<float>(u < 0.0f) - static_cast<float>(u >= turn));  // it may start anywhere on the circle
+    u += turn * (static_cast<float>(u < 0.0f) -
+                 static_cast<float>(u >= turn));  // it may start anywhere on the circle
     u = u < -1.0f ? -1.0f : u;
     u = u > columns ? columns : u;
     const bool seen = u >= 0.0f && u < columns;
@@ -89,8 +92,8 @@ bool row_span(const TsdfObservation& o, double dy, double* low, double* high) {
   const double right = o.T_map_sensor.yaw_rad + std::min(first, last);
   const double left = o.T_map_sensor.yaw_rad + std::max(first, last);
   if (left - right >= 2.0 * kPi - 0.02) return true;
-  // The half planes left of the right edge and right of the left edge: a narrow view is their intersection, a wide
-  // one their union.
+  // The half planes left of the right edge and right of the left edge: a narrow view is their intersection, a
+  // wide one their union.
   struct Span {
     double low, high;
   };
@@ -196,7 +199,8 @@ void TsdfGrid::scroll_to(double x_m, double y_m, std::uint32_t next_sequence) {
 }
 
 void TsdfGrid::set_value(int ix, int iy, std::int8_t value) {
-  // The cell is a corner of four quads. The torus' seam mixes both edges of the window; lookups there are outside.
+  // The cell is a corner of four quads. The torus' seam mixes both edges of the window; lookups there are
+  // outside.
   const std::uint32_t byte = static_cast<std::uint8_t>(value);
   std::uint32_t& a = quad_[index(ix, iy)];
   a = (a & 0xFFFFFF00u) | byte;
@@ -224,7 +228,9 @@ float TsdfGrid::distance(int ix, int iy) const {
                         : std::numeric_limits<float>::quiet_NaN();
 }
 
-float TsdfGrid::weight(int ix, int iy) const { return static_cast<float>(weight_[index(ix, iy)]) / weight_unit_; }
+float TsdfGrid::weight(int ix, int iy) const {
+  return static_cast<float>(weight_[index(ix, iy)]) / weight_unit_;
+}
 
 void TsdfGrid::add(const TsdfObservation& observation) { apply<true>(observation); }
 void TsdfGrid::remove(const TsdfObservation& observation) { apply<false>(observation); }
@@ -247,8 +253,8 @@ void TsdfGrid::apply(const TsdfObservation& o) {
 
 template <bool kAdd>
 void TsdfGrid::apply_row(const TsdfObservation& o, int iy, int from, int to) {
-  // Offsets are counted from the sensor's own cell, an absolute index: a cell's numbers do not depend on where the
-  // window lies, so removal after scrolling repeats them to the bit.
+  // Offsets are counted from the sensor's own cell, an absolute index: a cell's numbers do not depend on
+  // where the window lies, so removal after scrolling repeats them to the bit.
   const int sensor_x = cell_of(o.T_map_sensor.x_m), sensor_y = cell_of(o.T_map_sensor.y_m);
   const auto resolution = static_cast<float>(config_.resolution_m);
   RowProjection p;
@@ -256,7 +262,8 @@ void TsdfGrid::apply_row(const TsdfObservation& o, int iy, int from, int to) {
   p.sin_yaw = static_cast<float>(std::sin(o.T_map_sensor.yaw_rad));
   p.resolution = resolution;
   p.first_dx = static_cast<float>(center_m(sensor_x) - o.T_map_sensor.x_m);
-  p.dy = static_cast<float>(center_m(sensor_y) - o.T_map_sensor.y_m) + resolution * static_cast<float>(iy - sensor_y);
+  p.dy = static_cast<float>(center_m(sensor_y) - o.T_map_sensor.y_m) +
+         resolution * static_cast<float>(iy - sensor_y);
   p.columns = static_cast<int>(o.columns());
   const int count = to - from;
   if (o.pinhole) {
@@ -266,8 +273,7 @@ void TsdfGrid::apply_row(const TsdfObservation& o, int iy, int from, int to) {
   } else {
     p.column_scale = 1.0f / o.angle_increment_rad;
     p.column_shift = 0.5f - o.angle_min_rad / o.angle_increment_rad;
-    project_row_angular(p, from, count, row_column_.data(), row_distance_m_.data(),
-                        row_angle_rad_.data());
+    project_row_angular(p, from, count, row_column_.data(), row_distance_m_.data(), row_angle_rad_.data());
   }
   const auto floor_m = static_cast<float>(config_.weight_range_floor_m);
   const float floor2 = floor_m * floor_m;
@@ -280,20 +286,27 @@ void TsdfGrid::apply_row(const TsdfObservation& o, int iy, int from, int to) {
     const float d = row_distance_m_[static_cast<std::size_t>(k)];
     const float eta = o.range_m[u] - d;  // NaN without a surface
     const float mu = o.truncation_m[u];
-    const bool near_surface = eta >= -o.behind_m[u] && eta < mu;
+    const bool near_surface = eta >= -mu && eta < mu;
     const bool carved = !near_surface && d >= o.free_from_m[u] && d <= o.free_to_m[u];
     if (!near_surface && !carved) continue;
     const float f = near_surface ? eta / mu : 1.0f;  // equation 2: min(1, |eta| / mu) sgn(eta)
     const float square = d * d > floor2 ? d * d : floor2;
-    const float taper = o.taper && eta < 0.0f ? 1.0f + eta / o.behind_m[u] : 1.0f;
-    const auto w = static_cast<std::int32_t>(taper * weight_unit_ / square + 0.5f);  // equation 4
+    float weight = weight_unit_ / square;  // equation 4
+    if (eta < 0.0f) {
+      const float depth = -eta / mu;
+      const float share = depth <= o.behind_full ? 1.0f : (1.0f - depth) / (1.0f - o.behind_full);
+      for (int power = 0; power < o.behind_power; ++power) weight *= share;
+      weight = weight < 1.0f ? 1.0f : weight;  // stays known
+    }
+    const auto w = static_cast<std::int32_t>(weight + 0.5f);
     const float product = f * static_cast<float>(w);
     const auto fw = static_cast<std::int32_t>(product + (product < 0.0f ? -0.5f : 0.5f));
     const int ix = sensor_x + from + k;
     const std::size_t i = index(ix, iy);
     if constexpr (kAdd) {
       const auto held = static_cast<std::int8_t>(quad_[i] & 0xFFu);
-      if (carved && held != kUnknown && held < support && d > o.clear_from_m[u] && d + mu_clear < o.clear_to_m[u]) {
+      if (carved && held != kUnknown && held < support && d > o.clear_from_m[u] &&
+          d + mu_clear < o.clear_to_m[u]) {
         if (++contradictions_[i] >= config_.contradictions_to_reset) {
           weighted_sum_[i] = 0;
           weight_[i] = 0;

@@ -36,25 +36,30 @@ struct TsdfConfig {
   double observation_capacity() const { return 2147483647.0 / largest_weight(); }
 };
 
-/// The projective truncated signed distance map of paper section III.D, as a torus that scrolls with the robot.
+/// The projective truncated signed distance map of paper section III.D, as a torus that scrolls with the
+/// robot.
 ///
-/// Each cell holds the integer sums of w f and of w, so that taking an observation away (equations 8, 9) is exact
-/// to the bit whatever the order. A cell also remembers since which observation it counts: scrolling a cell in, or
-/// clear free evidence against its surface, resets it, and removing an older observation then skips it. Hence a
-/// cell always holds exactly the sum of the held observations that are not older than its reset.
+/// Each cell holds the integer sums of w f and of w, so that taking an observation away (equations 8, 9) is
+/// exact to the bit whatever the order. A cell also remembers since which observation it counts: scrolling a
+/// cell in, or clear free evidence against its surface, resets it, and removing an older observation then
+/// skips it. Hence a cell always holds exactly the sum of the held observations that are not older than its
+/// reset.
 ///
-/// Cells are addressed by absolute integers: cell (ix, iy) has its centre at ((ix + 0.5) res, (iy + 0.5) res).
+/// Cells are addressed by absolute integers: cell (ix, iy) has its centre at ((ix + 0.5) res, (iy + 0.5)
+/// res).
 class TsdfGrid {
  public:
   static constexpr std::int8_t kUnknown = -128;
   static constexpr float kValueScale = 127.0f;
 
-  /// @param half_size_m the window reaches at least this far from its centre (sizes round up to powers of two)
+  /// @param half_size_m the window reaches at least this far from its centre (sizes round up to powers of
+  /// two)
   TsdfGrid(const TsdfConfig& config, double half_size_m);
 
   /// Everything becomes unknown.
   void clear();
-  /// Moves the window so that the point lies within a scroll step of its centre. Cells that enter are unknown.
+  /// Moves the window so that the point lies within a scroll step of its centre. Cells that enter are
+  /// unknown.
   /// @param next_sequence that of the next observation to be added
   void scroll_to(double x_m, double y_m, std::uint32_t next_sequence);
 
@@ -90,13 +95,11 @@ class TsdfGrid {
   /// The window's clock when the cell was last touched.
   float last_seen_s(int ix, int iy) const { return last_seen_s_[index(ix, iy)]; }
 
-  /// F of the four cells whose centres surround a point, as signed bytes (kUnknown where W = 0), packed in one word
-  /// per lower left cell: bits 0-7 (x, y), 8-15 (x + 1, y), 16-23 (x, y + 1), 24-31 (x + 1, y + 1). One random read
-  /// gives all that bilinear interpolation needs.
+  /// F of the four cells whose centres surround a point, as signed bytes (kUnknown where W = 0), packed in
+  /// one word per lower left cell: bits 0-7 (x, y), 8-15 (x + 1, y), 16-23 (x, y + 1), 24-31 (x + 1, y + 1).
+  /// One random read gives all that bilinear interpolation needs.
   const std::uint32_t* quads() const { return quad_.data(); }
-  std::int8_t value(int ix, int iy) const {
-    return static_cast<std::int8_t>(quad_[index(ix, iy)] & 0xFFu);
-  }
+  std::int8_t value(int ix, int iy) const { return static_cast<std::int8_t>(quad_[index(ix, iy)] & 0xFFu); }
   float weight_unit() const { return weight_unit_; }
   const std::int32_t* weighted_sums() const { return weighted_sum_.data(); }
   const std::int32_t* weights() const { return weight_.data(); }
@@ -121,14 +124,15 @@ class TsdfGrid {
   std::vector<float> last_seen_s_;
   std::vector<std::uint32_t> quad_;
   std::vector<std::uint8_t> contradictions_;
-  std::vector<std::int32_t> row_column_;  ///< scratch of one row: the observation's column of each cell, or -1
-  std::vector<float> row_distance_m_;     ///< ... and its distance from the sensor
+  std::vector<std::int32_t>
+      row_column_;                     ///< scratch of one row: the observation's column of each cell, or -1
+  std::vector<float> row_distance_m_;  ///< ... and its distance from the sensor
   std::vector<float> row_angle_rad_;
   std::uint64_t contradicted_ = 0;
 };
 
-/// F bilinearly between the known cells round a point, in [-1, 1]; returns the weight [0, 1] of the known ones, 0
-/// (and *value untouched) if all are unknown or the point is outside the window.
+/// F bilinearly between the known cells round a point, in [-1, 1]; returns the weight [0, 1] of the known
+/// ones, 0 (and *value untouched) if all are unknown or the point is outside the window.
 float interpolate(const TsdfGrid& grid, double x_m, double y_m, float* value);
 
 }  // namespace knav

@@ -10,17 +10,16 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 void resize(std::size_t columns, TsdfObservation* out) {
-  for (std::vector<float>* field : {&out->direction_x, &out->direction_y, &out->range_m, &out->truncation_m, &out->behind_m,
-                                    &out->free_from_m, &out->free_to_m, &out->clear_from_m, &out->clear_to_m}) {
+  for (std::vector<float>* field :
+       {&out->direction_x, &out->direction_y, &out->range_m, &out->truncation_m, &out->free_from_m,
+        &out->free_to_m, &out->clear_from_m, &out->clear_to_m}) {
     field->resize(columns);
   }
 }
 
 void set_truncation(const TruncationConfig& truncation, std::size_t i, TsdfObservation* out) {
   const float r = out->range_m[i];
-  out->taper = truncation.tapers();
   out->truncation_m[i] = std::isnan(r) ? 0.0f : truncation.at(r);
-  out->behind_m[i] = std::isnan(r) ? 0.0f : truncation.behind_at(r);
 }
 
 bool answered(const TsdfObservation& o, std::size_t i) {
@@ -36,9 +35,9 @@ float sine_between(const TsdfObservation& o, std::size_t i, std::size_t k) {
   return std::fabs(o.direction_x[i] * o.direction_y[k] - o.direction_y[i] * o.direction_x[k]);
 }
 
-/// The tube of +-margin round each ray. A neighbour's answer at range r ends all tubes that it lies in. Beside a
-/// column without any answer nothing is sure until the rays are a margin apart, so that a dark pole between good
-/// columns is not carved away.
+/// The tube of +-margin round each ray. A neighbour's answer at range r ends all tubes that it lies in.
+/// Beside a column without any answer nothing is sure until the rays are a margin apart, so that a dark pole
+/// between good columns is not carved away.
 void set_clear(const ObservationLimits& limits, TsdfObservation* out) {
   const std::size_t n = out->columns();
   const auto margin = static_cast<float>(limits.clear_margin_m);
@@ -76,7 +75,7 @@ void set_clear(const ObservationLimits& limits, TsdfObservation* out) {
 void set_reach(TsdfObservation* out) {
   float reach = 0.0f;
   for (std::size_t i = 0; i < out->columns(); ++i) {
-    if (!std::isnan(out->range_m[i])) reach = std::max(reach, out->range_m[i] + out->behind_m[i]);
+    if (!std::isnan(out->range_m[i])) reach = std::max(reach, out->range_m[i] + out->truncation_m[i]);
     if (out->free_to_m[i] >= out->free_from_m[i]) reach = std::max(reach, out->free_to_m[i]);
   }
   out->reach_m = reach;
@@ -85,13 +84,16 @@ void set_reach(TsdfObservation* out) {
 }  // namespace
 
 int TsdfObservation::valid_ranges() const {
-  return static_cast<int>(std::count_if(range_m.begin(), range_m.end(), [](float r) { return !std::isnan(r); }));
+  return static_cast<int>(
+      std::count_if(range_m.begin(), range_m.end(), [](float r) { return !std::isnan(r); }));
 }
 
 void observation_from(const DepthProfile& profile, const ObservationLimits& limits, TsdfObservation* out) {
   const std::size_t n = profile.z_m.size();
   resize(n, out);
   out->stamp_s = profile.stamp_s;
+  out->behind_full = static_cast<float>(limits.truncation.behind_full);
+  out->behind_power = limits.truncation.behind_power;
   out->pinhole = true;
   out->fx_px = static_cast<float>(profile.fx_px);
   out->cx_px = static_cast<float>(profile.cx_px);
@@ -104,13 +106,15 @@ void observation_from(const DepthProfile& profile, const ObservationLimits& limi
     out->direction_x[i] = 1.0f / stretch;
     out->direction_y[i] = -right / stretch;
     const float z = profile.z_m[i];
-    out->range_m[i] = z >= low && z <= high ? z * stretch : kNaN;  // equation 3: the range along the ray, not z
+    out->range_m[i] =
+        z >= low && z <= high ? z * stretch : kNaN;  // equation 3: the range along the ray, not z
     set_truncation(limits.truncation, i, out);
     const float from = profile.free_from_m[i], to = std::min(profile.free_to_m[i], high);
     const bool free = from >= 0.0f && to > from;
     out->free_from_m[i] = free ? from * stretch : 0.0f;
     out->free_to_m[i] = free ? to * stretch : -1.0f;
-    if (free && !std::isnan(out->range_m[i])) out->free_to_m[i] = std::min(out->free_to_m[i], out->range_m[i]);
+    if (free && !std::isnan(out->range_m[i]))
+      out->free_to_m[i] = std::min(out->free_to_m[i], out->range_m[i]);
   }
   set_clear(limits, out);
   set_reach(out);
@@ -120,6 +124,8 @@ void observation_from(const RangeScan& scan, const ObservationLimits& limits, Ts
   const std::size_t n = scan.range_m.size();
   resize(n, out);
   out->stamp_s = scan.stamp_s;
+  out->behind_full = static_cast<float>(limits.truncation.behind_full);
+  out->behind_power = limits.truncation.behind_power;
   out->pinhole = false;
   out->angle_min_rad = static_cast<float>(scan.angle_min_rad);
   out->angle_increment_rad = static_cast<float>(scan.angle_increment_rad);

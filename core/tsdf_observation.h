@@ -9,30 +9,28 @@
 
 namespace knav {
 
-/// How the truncation of the signed distance grows with the range r of the surface, as the sensor's noise does:
-/// mu(r) = base + per_range_squared r^2, at most `limit` (paper section III.D: "scaled with the distance to the
-/// obstacle along the ray"). A Kinect's disparity noise is about 0.0015 r^2.
+/// How the truncation of the signed distance grows with the range r of the surface, as the sensor's noise
+/// does: mu(r) = base + per_range_squared r^2, at most `limit` (paper section III.D: "scaled with the
+/// distance to the obstacle along the ray"). A Kinect's disparity noise is about 0.0015 r^2.
 struct TruncationConfig {
   double base_m = 0.4;
   double per_range_squared = 0.003;
   double limit_m = 2.0;
-  double behind_m = 0.2;
+  double behind_full = 0.3;
+  int behind_power = 4;
 
   template <class Visitor>
   void visit(Visitor& v) {
     v.number("base_m", base_m, 0.05, 5, "m", "Truncation at range 0.");
     v.number("per_range_squared", per_range_squared, 0, 0.1, "1/m", "Its growth with the range squared.");
     v.number("limit_m", limit_m, 0.05, 10, "m", "Its largest value.");
-    v.number("behind_m", behind_m, 0.05, 10, "m",
-             "Behind a surface the weight falls to nothing over this and the same growth; 10 = the paper's full weight "
-             "over the whole truncation, which pushes thin walls seen from both sides apart.");
-  }
-  bool tapers() const { return behind_m < 10.0; }
-  /// How far behind a surface at this range cells are touched.
-  float behind_at(float range_m) const {
-    const float behind = static_cast<float>(behind_m) + static_cast<float>(per_range_squared) * range_m * range_m;
-    const float mu = at(range_m);
-    return tapers() && behind < mu ? behind : mu;
+    v.number(
+        "behind_full", behind_full, 0, 0.95, "",
+        "Behind a surface the full weight holds for this share of the truncation (noise reaches there) ...");
+    v.integer("behind_power", behind_power, 0, 16, "",
+              "... and falls beyond it to nothing with this power of the rest. 0 = the paper's full weight "
+              "throughout, "
+              "which thickens thin walls that are seen from both sides.");
   }
   float at(float range_m) const {
     const float mu = static_cast<float>(base_m) + static_cast<float>(per_range_squared) * range_m * range_m;
@@ -41,15 +39,15 @@ struct TruncationConfig {
   }
 };
 
-/// One profile or scan as the grid takes it: per column the ranges along the column's ray, from a known pose. All
-/// that integrating needs is in here, so that removing recomputes exactly what was added.
+/// One profile or scan as the grid takes it: per column the ranges along the column's ray, from a known pose.
+/// All that integrating needs is in here, so that removing recomputes exactly what was added.
 struct TsdfObservation {
   double stamp_s = 0.0;
   std::uint32_t sequence = 0;  ///< rises by one with every observation of a grid, from 1
   float age_clock_s = 0.0f;    ///< the window's clock when it was taken
   Pose2 T_map_sensor;
 
-  bool pinhole = true;             ///< columns evenly spaced on an image row; otherwise in angle
+  bool pinhole = true;  ///< columns evenly spaced on an image row; otherwise in angle
   float fx_px = 0.0f, cx_px = 0.0f;
   float angle_min_rad = 0.0f, angle_increment_rad = 0.0f;
 
@@ -57,12 +55,12 @@ struct TsdfObservation {
   std::vector<float> direction_x, direction_y;  ///< unit vector of the ray in the sensor's frame
   std::vector<float> range_m;                   ///< NaN: no surface
   std::vector<float> truncation_m;              ///< mu(range)
-  std::vector<float> behind_m;                  ///< cells farther than this behind the surface are not touched
-  bool taper = true;                            ///< the weight falls to nothing over behind_m
-  std::vector<float> free_from_m, free_to_m;    ///< carved between these; free_to < free_from: nothing
+  float behind_full = 0.0f;                     ///< see TruncationConfig
+  int behind_power = 0;
+  std::vector<float> free_from_m, free_to_m;  ///< carved between these; free_to < free_from: nothing
   /// Between these nothing stands within a margin on either side of the ray.
   std::vector<float> clear_from_m, clear_to_m;
-  float reach_m = 0.0f;           ///< no cell farther than this is touched
+  float reach_m = 0.0f;  ///< no cell farther than this is touched
 
   std::size_t columns() const { return range_m.size(); }
   int valid_ranges() const;

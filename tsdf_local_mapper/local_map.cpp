@@ -26,7 +26,8 @@ void extract_occupancy(const TsdfGrid& grid, double center_x_m, double center_y_
       bool surface = value == 0;
       for (const int other : neighbours) {
         if (other == TsdfGrid::kUnknown || (value > 0) == (other > 0)) continue;
-        if (std::abs(value) < std::abs(other) || (std::abs(value) == std::abs(other) && value < 0)) surface = true;
+        if (std::abs(value) < std::abs(other) || (std::abs(value) == std::abs(other) && value < 0))
+          surface = true;
       }
       if (surface) {
         map->value[out] = 100;

@@ -36,28 +36,44 @@ ObservationLimits limits_of(const LocalMapperConfig& config) {
 
 const char* to_string(FrameOutcome outcome) {
   switch (outcome) {
-    case FrameOutcome::kAligned: return "aligned";
-    case FrameOutcome::kStarted: return "started";
-    case FrameOutcome::kNoReadings: return "no readings";
-    case FrameOutcome::kParked: return "parked";
-    case FrameOutcome::kSuspicious: return "suspicious";
-    case FrameOutcome::kDuplicate: return "duplicate";
-    case FrameOutcome::kOutOfOrder: return "out of order";
-    case FrameOutcome::kWaitForOdometry: return "waiting for odometry";
-    case FrameOutcome::kNoOdometry: return "no odometry";
-    case FrameOutcome::kBadFrame: return "bad frame";
+    case FrameOutcome::kAligned:
+      return "aligned";
+    case FrameOutcome::kStarted:
+      return "started";
+    case FrameOutcome::kNoReadings:
+      return "no readings";
+    case FrameOutcome::kParked:
+      return "parked";
+    case FrameOutcome::kSuspicious:
+      return "suspicious";
+    case FrameOutcome::kDuplicate:
+      return "duplicate";
+    case FrameOutcome::kOutOfOrder:
+      return "out of order";
+    case FrameOutcome::kWaitForOdometry:
+      return "waiting for odometry";
+    case FrameOutcome::kNoOdometry:
+      return "no odometry";
+    case FrameOutcome::kBadFrame:
+      return "bad frame";
   }
   return "?";
 }
 
 const char* to_string(EpochReason reason) {
   switch (reason) {
-    case EpochReason::kStart: return "start";
-    case EpochReason::kReset: return "reset";
-    case EpochReason::kClockJump: return "clock jumped back";
-    case EpochReason::kOdometryGap: return "odometry gap";
-    case EpochReason::kOdometryJump: return "odometry jumped";
-    case EpochReason::kCarried: return "carried";
+    case EpochReason::kStart:
+      return "start";
+    case EpochReason::kReset:
+      return "reset";
+    case EpochReason::kClockJump:
+      return "clock jumped back";
+    case EpochReason::kOdometryGap:
+      return "odometry gap";
+    case EpochReason::kOdometryJump:
+      return "odometry jumped";
+    case EpochReason::kCarried:
+      return "carried";
   }
   return "?";
 }
@@ -96,16 +112,16 @@ struct LocalMapper::State {
   EpochReason odometry_fault = EpochReason::kOdometryGap;
   WeightedPoints points;
 
-  bool have_frame = false;   ///< stamp_s, T_odom_base and T_local_base of `result` mean something
+  bool have_frame = false;  ///< stamp_s, T_odom_base and T_local_base of `result` mean something
   bool have_map = false;
   bool newest_integrated = false;
   bool any_epoch = false;
-  double clock_s = 0.0;      ///< the window's clock
+  double clock_s = 0.0;  ///< the window's clock
   double travelled_m = 0.0;
-  Pose2 rest_T_odom_base;    ///< where the robot last was when it moved
+  Pose2 rest_T_odom_base;  ///< where the robot last was when it moved
   double moved_stamp_s = 0.0;
   bool parked = false;
-  std::string news;          ///< of an epoch, until an accepted frame has told it
+  std::string news;                   ///< of an epoch, until an accepted frame has told it
   Pose2 learn_T_odom, learn_T_local;  ///< start of the stretch that the learner compares next
   LocalMapperResult result;
   LocalMapperResult rejected;
@@ -137,7 +153,7 @@ void LocalMapper::State::add_odometry(double stamp_s, const Pose2& T_odom_base) 
 }
 
 const LocalMapperResult& LocalMapper::State::reject(FrameOutcome outcome, double stamp_s,
-                                                     const std::string& reason) {
+                                                    const std::string& reason) {
   rejected = result;
   rejected.accepted = false;
   rejected.outcome = outcome;
@@ -216,7 +232,7 @@ void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, 
   } else {
     filter.predict(learner.corrected(T_step));
     if (readings) {
-      filter.update(grid, points, result.stamp_s);
+      filter.update(grid, &points, result.stamp_s);
     } else {
       filter.estimate_from_particles();
     }
@@ -239,7 +255,8 @@ void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, 
 void LocalMapper::State::learn_odometry() {
   const Pose2 odometry_step = learn_T_odom.inverse() * result.T_odom_base;
   const bool aligned = result.outcome == FrameOutcome::kAligned;
-  const bool far = std::hypot(odometry_step.x_m, odometry_step.y_m) > 0.3 || std::fabs(odometry_step.yaw_rad) > 0.3;
+  const bool far =
+      std::hypot(odometry_step.x_m, odometry_step.y_m) > 0.3 || std::fabs(odometry_step.yaw_rad) > 0.3;
   if (aligned && !far) return;
   if (aligned) learner.learn(odometry_step, learn_T_local.inverse() * result.T_local_base);
   learn_T_odom = result.T_odom_base;
@@ -247,13 +264,16 @@ void LocalMapper::State::learn_odometry() {
 }
 
 template <class Frame>
-const LocalMapperResult& LocalMapper::State::update(const Frame& frame, bool sensible, const Pose2& T_base_sensor) {
+const LocalMapperResult& LocalMapper::State::update(const Frame& frame, bool sensible,
+                                                    const Pose2& T_base_sensor) {
   const double stamp_s = frame.stamp_s;
   if (!sensible || !std::isfinite(stamp_s) || !is_finite(T_base_sensor)) {
-    return reject(FrameOutcome::kBadFrame, stamp_s, "the frame has no columns, or a stamp or model that makes no sense");
+    return reject(FrameOutcome::kBadFrame, stamp_s,
+                  "the frame has no columns, or a stamp or model that makes no sense");
   }
   if (have_frame && stamp_s <= result.stamp_s) {
-    if (stamp_s == result.stamp_s) return reject(FrameOutcome::kDuplicate, stamp_s, "this stamp was seen before");
+    if (stamp_s == result.stamp_s)
+      return reject(FrameOutcome::kDuplicate, stamp_s, "this stamp was seen before");
     if (result.stamp_s - stamp_s <= config.continuity.clock_jump_s) {
       return reject(FrameOutcome::kOutOfOrder, stamp_s, "older than the newest frame");
     }
@@ -310,29 +330,33 @@ const LocalMapperResult& LocalMapper::State::update(const Frame& frame, bool sen
   news.clear();
   result.cost = filter.mean_cost();
   result.effective_particles = filter.effective_particles();
-  result.particle_lifespan_s = filter.lifespan_s(stamp_s);
+  result.particle_lifespan_s = filter.lifespan_s();
   result.agree_fraction = view_check.agree_fraction();
   result.see_through_fraction = view_check.see_through_fraction();
   result.observations = window.size();
   return result;
 }
 
-LocalMapper::LocalMapper(const LocalMapperConfig& config) : state_(std::make_unique<State>(checked(config))) {}
+LocalMapper::LocalMapper(const LocalMapperConfig& config)
+    : state_(std::make_unique<State>(checked(config))) {}
 LocalMapper::~LocalMapper() = default;
 
-void LocalMapper::add_odometry(double stamp_s, const Pose2& T_odom_base) { state_->add_odometry(stamp_s, T_odom_base); }
+void LocalMapper::add_odometry(double stamp_s, const Pose2& T_odom_base) {
+  state_->add_odometry(stamp_s, T_odom_base);
+}
 
 const LocalMapperResult& LocalMapper::update(const DepthProfile& profile, const Pose2& T_base_camera) {
   const std::size_t columns = profile.z_m.size();
   const bool sensible = columns > 0 && profile.free_from_m.size() == columns &&
-                        profile.free_to_m.size() == columns && profile.fx_px > 0.0 && std::isfinite(profile.fx_px) &&
-                        std::isfinite(profile.cx_px);
+                        profile.free_to_m.size() == columns && profile.fx_px > 0.0 &&
+                        std::isfinite(profile.fx_px) && std::isfinite(profile.cx_px);
   return state_->update(profile, sensible, T_base_camera);
 }
 
 const LocalMapperResult& LocalMapper::update(const RangeScan& scan, const Pose2& T_base_sensor) {
   const double turn = std::fabs(scan.angle_increment_rad) * static_cast<double>(scan.range_m.size());
-  const bool sensible = !scan.range_m.empty() && std::isfinite(scan.angle_min_rad) && turn > 0.0 && turn < 6.5;
+  const bool sensible =
+      !scan.range_m.empty() && std::isfinite(scan.angle_min_rad) && turn > 0.0 && turn < 6.5;
   return state_->update(scan, sensible, T_base_sensor);
 }
 
@@ -347,7 +371,8 @@ void LocalMapper::extract_scan_360(RangeScan* scan) const {
 
 void LocalMapper::extract_local_map(OccupancyGrid* map) const {
   const State& s = *state_;
-  extract_occupancy(s.grid, s.result.T_local_base.x_m, s.result.T_local_base.y_m, s.config.local_map_size_m, map);
+  extract_occupancy(s.grid, s.result.T_local_base.x_m, s.result.T_local_base.y_m, s.config.local_map_size_m,
+                    map);
 }
 
 void LocalMapper::reset() {

@@ -46,17 +46,17 @@ struct LocalMapperResult {
   Pose2 T_odom_base;  ///< odometry at the frame's stamp
 
   // For diagnostics.
-  double cost = 0.0;                  ///< of the estimate, 0 ... 1 (NaN if nothing was compared)
+  double cost = 0.0;  ///< of the estimate, 0 ... 1 (NaN if nothing was compared)
   double effective_particles = 0.0;
-  double particle_lifespan_s = 0.0;   ///< how long ago all particles had one ancestor
+  double particle_lifespan_s = 0.0;   ///< until nine in ten of a generation had no descendants left
   double agree_fraction = 0.0;        ///< readings on known rays that meet the map's surface
   double see_through_fraction = 0.0;  ///< ... that lie behind it
   int observations = 0;               ///< held in the map
 };
 
-/// Paper sections III.D-III.F: keeps a sliding-window signed distance map, estimates the robot's motion by aligning
-/// each new profile with it, and looks round in it by 360 degrees. Not thread safe. Same input and seed give the
-/// same bytes.
+/// Paper sections III.D-III.F: keeps a sliding-window signed distance map, estimates the robot's motion by
+/// aligning each new profile with it, and looks round in it by 360 degrees. Not thread safe. Same input and
+/// seed give the same bytes.
 class LocalMapper {
  public:
   /// Throws UserError if the configuration is not valid.

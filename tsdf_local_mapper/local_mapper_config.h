@@ -22,8 +22,10 @@ struct WindowConfig {
     v.number("duration_s", duration_s, 1, 3600, "s", "An observation leaves the map after this long.");
     v.number("distance_m", distance_m, 1, 200, "m", "An observation leaves after the robot drove this far.");
     v.choice("clock", clock, {"paper", "moving"},
-             "What duration_s counts: all time, or only the time the robot moves (a parked robot keeps its walls).");
-    v.integer("max_observations", max_observations, 10, 100000, "frames", "The oldest leaves when there are more.");
+             "What duration_s counts: all time, or only the time the robot moves (a parked robot keeps its "
+             "walls).");
+    v.integer("max_observations", max_observations, 10, 100000, "frames",
+              "The oldest leaves when there are more.");
     v.integer("parked_observations", parked_observations, 1, 100000, "frames",
               "While parked (clock: moving) only this many of the newest frames of that place are held.");
   }
@@ -43,15 +45,20 @@ struct FilterConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v.integer("particles", particles, 10, 200000, "", "Pose hypotheses.");
-    v.integer("readings", readings, 8, 4000, "", "Readings of a frame that are compared with the map, at most.");
+    v.integer("readings", readings, 8, 4000, "",
+              "Readings of a frame that are compared with the map, at most.");
     v.choice("alignment_cost", alignment_cost, {"paper", "normalized"},
              "paper: sum of |F W| (equation 7). normalized: mean of |F|, with a price for unknown cells.");
-    v.number("temperature", temperature, 1e-5, 1, "", "normalized: a cost difference this large means a factor e.");
-    v.number("paper_temperature", paper_temperature, 1e-5, 10, "", "paper: the same, times the mean weight W.");
+    v.number("temperature", temperature, 1e-5, 1, "",
+             "normalized: a cost difference this large means a factor e.");
+    v.number("paper_temperature", paper_temperature, 1e-5, 10, "",
+             "paper: the same, times the mean weight W.");
     v.number("unknown_price", unknown_price, 0, 1, "", "normalized: cost of a reading in a cell never seen.");
-    v.integer("refinements", refinements, 0, 10, "", "Rounds of resampling with shrinking noise within a frame.");
-    v.number("odometry_learning_m", odometry_learning_m, 0, 1000, "m",
-             "Distance over which odometry's steady errors are learned and taken out of the proposal; 0 = never.");
+    v.integer("refinements", refinements, 0, 10, "",
+              "Rounds of resampling with shrinking noise within a frame.");
+    v.number(
+        "odometry_learning_m", odometry_learning_m, 0, 1000, "m",
+        "Distance over which odometry's steady errors are learned and taken out of the proposal; 0 = never.");
   }
 };
 
@@ -66,12 +73,14 @@ struct ContinuityConfig {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.number("odometry_gap_s", odometry_gap_s, 0.05, 60, "s", "Odometry silent for longer starts a new epoch.");
+    v.number("odometry_gap_s", odometry_gap_s, 0.05, 60, "s",
+             "Odometry silent for longer starts a new epoch.");
     v.number("odometry_extrapolation_s", odometry_extrapolation_s, 0, 1, "s",
              "A frame may be this much newer than the newest odometry.");
     v.number("odometry_max_speed_mps", odometry_max_speed_mps, 0.1, 100, "m/s",
              "Odometry that jumps faster than this was reset: a new epoch.");
-    v.number("clock_jump_s", clock_jump_s, 0, 60, "s", "A frame older than the newest by more: the clock jumped.");
+    v.number("clock_jump_s", clock_jump_s, 0, 60, "s",
+             "A frame older than the newest by more: the clock jumped.");
     v.number("carried_after_s", carried_after_s, 0.1, 60, "s",
              "Looking through known walls for this long means that the robot was carried: a new epoch.");
     v.number("carried_see_through_fraction", carried_see_through_fraction, 0.05, 1, "",
@@ -97,8 +106,9 @@ struct LocalMapperRosConfig {
     v.flag("publish_tf", publish_tf, "Publish the leaf odom -> local_map.");
     v.number("local_map_rate_hz", local_map_rate_hz, 0.1, 100, "Hz", "local_map, at most.");
     v.number("particlecloud_rate_hz", particlecloud_rate_hz, 0.1, 100, "Hz", "local_particlecloud, at most.");
-    v.integer("frames_waiting", frames_waiting, 1, 100, "frames",
-              "Frames that wait for odometry to cover their stamp; the oldest is dropped when there are more.");
+    v.integer(
+        "frames_waiting", frames_waiting, 1, 100, "frames",
+        "Frames that wait for odometry to cover their stamp; the oldest is dropped when there are more.");
   }
 };
 

@@ -3,7 +3,6 @@
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <kinect_nav/DepthProfile.h>
 #include <nav_msgs/Odometry.h>
-#include <pluginlib/class_list_macros.hpp>
 #include <ros/ros.h>
 #include <sensor_msgs/LaserScan.h>
 #include <tf2_ros/buffer.h>
@@ -14,6 +13,7 @@
 #include <chrono>
 #include <deque>
 #include <memory>
+#include <pluginlib/class_list_macros.hpp>
 #include <string>
 
 #include "core/error.h"
@@ -44,7 +44,8 @@ class LocalMapperNodelet : public NodeletBase {
     diagnostics_->add("local mapper", this, &LocalMapperNodelet::diagnose);
     last_frame_wall_ = ros::WallTime::now();
     // Without TCP_NODELAY small odometry messages may be held back for 40 ms.
-    odom_ = node.subscribe("odom", 200, &LocalMapperNodelet::on_odometry, this, ros::TransportHints().tcpNoDelay());
+    odom_ = node.subscribe("odom", 200, &LocalMapperNodelet::on_odometry, this,
+                           ros::TransportHints().tcpNoDelay());
     profile_ = node.subscribe("depth_profile", 5, &LocalMapperNodelet::on_profile, this);
     scan_ = node.subscribe("scan_in", 5, &LocalMapperNodelet::on_scan, this);
     timer_ = node.createWallTimer(ros::WallDuration(1.0), &LocalMapperNodelet::on_timer, this);
@@ -66,7 +67,8 @@ class LocalMapperNodelet : public NodeletBase {
     while (static_cast<int>(pending_.size()) > config_.ros.frames_waiting) {
       pending_.pop_front();
       ++dropped_;
-      NODELET_WARN_THROTTLE(10.0, "Frames are dropped: odometry on '%s' does not keep up with them, or is missing.",
+      NODELET_WARN_THROTTLE(10.0,
+                            "Frames are dropped: odometry on '%s' does not keep up with them, or is missing.",
                             odom_.getTopic().c_str());
     }
   }
@@ -109,8 +111,8 @@ class LocalMapperNodelet : public NodeletBase {
     } catch (const tf2::TransformException& error) {
       transform_fault_ = error.what();
       ++no_transform_;
-      NODELET_WARN_THROTTLE(10.0, "No transform from '%s' to '%s' yet, frames are not used: %s", frame.c_str(),
-                            config_.ros.base_frame.c_str(), error.what());
+      NODELET_WARN_THROTTLE(10.0, "No transform from '%s' to '%s' yet, frames are not used: %s",
+                            frame.c_str(), config_.ros.base_frame.c_str(), error.what());
       return false;
     }
   }

@@ -1,8 +1,9 @@
 #include "tsdf_local_mapper/local_mapper_publisher.h"
 
-#include <boost/make_shared.hpp>
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/TransformStamped.h>
+
+#include <boost/make_shared.hpp>
 
 #include "ros_common/conversions.h"
 
@@ -43,7 +44,8 @@ void LocalMapperPublisher::publish(const LocalMapper& mapper) {
     message->header.frame_id = config_.local_map_frame;
     map_.publish(message);
   }
-  if (particles_.getNumSubscribers() > 0 && due(result.stamp_s, config_.particlecloud_rate_hz, &last_particles_s_)) {
+  if (particles_.getNumSubscribers() > 0 &&
+      due(result.stamp_s, config_.particlecloud_rate_hz, &last_particles_s_)) {
     publish_particles(mapper, stamp);
   }
   have_last_ = true;
@@ -91,7 +93,8 @@ void LocalMapperPublisher::publish_particles(const LocalMapper& mapper, const ro
   message->header.frame_id = config_.local_map_frame;
   const ParticleSet& particles = mapper.particles();
   message->poses.reserve(particles.size());
-  for (std::size_t i = 0; i < particles.size(); ++i) message->poses.push_back(pose_message(particles.pose(i)));
+  for (std::size_t i = 0; i < particles.size(); ++i)
+    message->poses.push_back(pose_message(particles.pose(i)));
   particles_.publish(message);
 }
 

@@ -13,7 +13,8 @@
 
 namespace knav {
 
-/// Everything the mapper tells the graph after a frame. Scans, maps and clouds are made only while someone listens.
+/// Everything the mapper tells the graph after a frame. Scans, maps and clouds are made only while someone
+/// listens.
 class LocalMapperPublisher {
  public:
   LocalMapperPublisher(ros::NodeHandle& node, const LocalMapperRosConfig& config);

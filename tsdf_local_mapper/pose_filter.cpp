@@ -9,6 +9,9 @@
 #include "core/tsdf_alignment.h"
 
 namespace knav {
+namespace {
+constexpr int kHypotheses = 24;
+}  // namespace
 
 PoseFilter::PoseFilter(const FilterConfig& config, const MotionModelConfig& motion, std::uint64_t seed)
     : config_(config), motion_(motion), seed_(seed) {
@@ -21,7 +24,7 @@ void PoseFilter::start_at(const Pose2& pose, double stamp_s) {
   for (std::size_t i = 0; i < particles_.size(); ++i) particles_.set(i, pose);
   std::fill(particles_.weight.begin(), particles_.weight.end(), 1.0 / static_cast<double>(particles_.size()));
   for (std::size_t i = 0; i < ancestor_.size(); ++i) ancestor_[i] = static_cast<std::uint32_t>(i);
-  ancestor_stamp_s_ = mark_stamp_s_ = stamp_s;
+  mark_stamp_s_ = stamp_s;
   mean_ = pose;
   covariance_.setZero();
   mean_cost_ = std::numeric_limits<double>::quiet_NaN();
@@ -89,7 +92,9 @@ void PoseFilter::jitter(const Pose2& center, const Eigen::Matrix3d& covariance, 
   ++step_;
 }
 
-void PoseFilter::update(const TsdfGrid& grid, const WeightedPoints& points, double stamp_s) {
+void PoseFilter::update(const TsdfGrid& grid, WeightedPoints* readings, double stamp_s) {
+  if (config_.alignment_cost == "normalized") weigh_by_known_share(grid, particles_, kHypotheses, readings);
+  const WeightedPoints& points = *readings;
   // Annealing: the likelihood enters in shares that sum to 1, the last and largest on the finest samples.
   double total = 0.0, share = 1.0;
   for (int r = 0; r <= config_.refinements; ++r, share *= 3.0) total += share;
@@ -113,8 +118,11 @@ void PoseFilter::update(const TsdfGrid& grid, const WeightedPoints& points, doub
 }
 
 void PoseFilter::track_ancestors(double stamp_s) {
-  if (!std::all_of(ancestor_.begin(), ancestor_.end(), [&](std::uint32_t a) { return a == ancestor_[0]; })) return;
-  ancestor_stamp_s_ = mark_stamp_s_;
+  // Resampling keeps the order, so descendants of one ancestor lie side by side.
+  std::size_t families = 1;
+  for (std::size_t i = 1; i < ancestor_.size(); ++i) families += ancestor_[i] != ancestor_[i - 1] ? 1 : 0;
+  if (10 * families > ancestor_.size()) return;
+  lifespan_s_ = stamp_s - mark_stamp_s_;
   mark_stamp_s_ = stamp_s;
   for (std::size_t i = 0; i < ancestor_.size(); ++i) ancestor_[i] = static_cast<std::uint32_t>(i);
 }

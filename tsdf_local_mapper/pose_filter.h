@@ -11,8 +11,8 @@
 
 namespace knav {
 
-/// The multi-hypothesis search over the robot's pose of paper section III.E: a particle filter whose observation
-/// model is the alignment cost on the signed distance map.
+/// The multi-hypothesis search over the robot's pose of paper section III.E: a particle filter whose
+/// observation model is the alignment cost on the signed distance map.
 class PoseFilter {
  public:
   PoseFilter(const FilterConfig& config, const MotionModelConfig& motion, std::uint64_t seed);
@@ -22,7 +22,8 @@ class PoseFilter {
   /// Odometry's step with its noise.
   void predict(const Pose2& T_before_after);
   /// Weighs the particles by how well the readings fit, refines them, and leaves the estimate in mean() etc.
-  void update(const TsdfGrid& grid, const WeightedPoints& points_robot, double stamp_s);
+  /// Sets the readings' weights.
+  void update(const TsdfGrid& grid, WeightedPoints* points_robot, double stamp_s);
   /// The estimate without a measurement.
   void estimate_from_particles();
   /// Moves all particles and the estimate rigidly, without noise.
@@ -32,8 +33,8 @@ class PoseFilter {
   const Eigen::Matrix3d& covariance() const { return covariance_; }
   double mean_cost() const { return mean_cost_; }
   double effective_particles() const { return effective_; }
-  /// How long ago all present particles had one common ancestor.
-  double lifespan_s(double stamp_s) const { return stamp_s - ancestor_stamp_s_; }
+  /// How long the last generation of hypotheses lived: until nine in ten had no descendants left.
+  double lifespan_s() const { return lifespan_s_; }
   const ParticleSet& particles() const { return particles_; }
 
  private:
@@ -49,7 +50,7 @@ class PoseFilter {
   ParticleSet particles_;
   std::vector<float> cost_;
   std::vector<std::uint32_t> parent_, ancestor_, ancestor_scratch_;
-  double ancestor_stamp_s_ = 0.0, mark_stamp_s_ = 0.0;
+  double lifespan_s_ = 0.0, mark_stamp_s_ = 0.0;
   Pose2 mean_;
   Eigen::Matrix3d covariance_ = Eigen::Matrix3d::Zero();
   double mean_cost_ = 0.0, effective_ = 0.0;

@@ -9,15 +9,16 @@
 
 namespace knav {
 
-/// The queue of observations that the map holds (paper section III.E): each leaves the map exactly as it came.
+/// The queue of observations that the map holds (paper section III.E): each leaves the map exactly as it
+/// came.
 class SlidingWindow {
  public:
   explicit SlidingWindow(const WindowConfig& config) : config_(config) {}
 
   /// Where to write the next observation; stays valid until push() or the next call.
   TsdfObservation& scratch();
-  /// Adds the scratch observation to the grid. Its pose and sensor model must be set; sequence and clock are set
-  /// here. While `parked`, only the newest few frames of the place are held.
+  /// Adds the scratch observation to the grid. Its pose and sensor model must be set; sequence and clock are
+  /// set here. While `parked`, only the newest few frames of the place are held.
   void push(TsdfGrid* grid, double clock_s, double travelled_m, bool parked);
   /// Takes out what is too old or too far back.
   void expire(TsdfGrid* grid, double clock_s, double travelled_m);

@@ -9,15 +9,16 @@ constexpr std::size_t kRays = 64;
 constexpr int kFewestKnown = 12;
 }  // namespace
 
-void ViewCheck::update(const TsdfGrid& grid, const TsdfObservation& o, const Pose2& T_map_sensor, double dt_s) {
+void ViewCheck::update(const TsdfGrid& grid, const TsdfObservation& o, const Pose2& T_map_sensor,
+                       double dt_s) {
   const double c = std::cos(T_map_sensor.yaw_rad), s = std::sin(T_map_sensor.yaw_rad);
   const std::size_t stride = std::max<std::size_t>(1, o.columns() / kRays);
   int known = 0, agree = 0, through = 0;
   for (std::size_t i = stride / 2; i < o.columns(); i += stride) {
     if (std::isnan(o.range_m[i])) continue;
     const double x = o.direction_x[i], y = o.direction_y[i];
-    const RayEnd end =
-        cast_ray(grid, contour_, T_map_sensor.x_m, T_map_sensor.y_m, c * x - s * y, s * x + c * y, range_max_m_);
+    const RayEnd end = cast_ray(grid, contour_, T_map_sensor.x_m, T_map_sensor.y_m, c * x - s * y,
+                                s * x + c * y, range_max_m_);
     if (end.kind != RayEnd::Kind::kSurface) continue;
     ++known;
     const double tolerance_m = std::max(0.25, 0.75 * static_cast<double>(o.truncation_m[i]));

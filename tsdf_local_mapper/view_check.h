@@ -5,8 +5,8 @@
 
 namespace knav {
 
-/// Compares a frame with what the map shows from the estimated pose. People and moved things stand in front of the
-/// map's surfaces; only a robot that is elsewhere than it believes looks through most of them.
+/// Compares a frame with what the map shows from the estimated pose. People and moved things stand in front
+/// of the map's surfaces; only a robot that is elsewhere than it believes looks through most of them.
 class ViewCheck {
  public:
   ViewCheck(const ContinuityConfig& config, const ContourConfig& contour, double range_max_m)
@@ -14,7 +14,8 @@ class ViewCheck {
 
   void reset() { suspicious_s_ = 0.0; }
   /// @param dt_s since the last frame
-  void update(const TsdfGrid& grid, const TsdfObservation& observation, const Pose2& T_map_sensor, double dt_s);
+  void update(const TsdfGrid& grid, const TsdfObservation& observation, const Pose2& T_map_sensor,
+              double dt_s);
 
   bool suspicious() const { return suspicious_; }
   /// It has been so for long enough.

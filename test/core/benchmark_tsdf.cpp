@@ -44,7 +44,8 @@ TsdfGrid hall(double wall_m) {
 
 void prepare_observation(benchmark::State& state) {
   std::uint32_t sequence = 0;
-  for (auto _ : state) benchmark::DoNotOptimize(kinect_observation(static_cast<double>(state.range(0)), ++sequence));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(kinect_observation(static_cast<double>(state.range(0)), ++sequence));
 }
 BENCHMARK(prepare_observation)->Arg(3)->Arg(18)->Unit(benchmark::kMicrosecond);
 

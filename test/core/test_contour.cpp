@@ -1,11 +1,12 @@
-// Analytic worlds as truth for the ray caster: rooms, thin walls, corridors at sharp angles, gaps in knowledge.
-#include "core/contour.h"
-
+// Analytic worlds as truth for the ray caster: rooms, thin walls, corridors at sharp angles, gaps in
+// knowledge.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 #include <limits>
+
+#include "core/contour.h"
 
 namespace knav {
 namespace {
@@ -42,7 +43,8 @@ class ContourTest : public ::testing::Test {
     scan.range_max_m = 30.0;
     for (int i = 0; i < n; ++i) {
       const double a = pose.yaw_rad + scan.angle_min_rad + i * scan.angle_increment_rad;
-      scan.range_m.push_back(static_cast<float>(true_range(world, pose.x_m, pose.y_m, std::cos(a), std::sin(a))));
+      scan.range_m.push_back(
+          static_cast<float>(true_range(world, pose.x_m, pose.y_m, std::cos(a), std::sin(a))));
     }
     ObservationLimits limits;
     limits.truncation = config_.truncation;
@@ -84,7 +86,8 @@ TEST_F(ContourTest, ARoomToAFractionOfACell) {
 }
 
 TEST_F(ContourTest, ACorridorSeenAtSharpAnglesHasNoHoles) {
-  // Driven along with the narrow view, the walls' support is thin (the paper's reason for visiting every cell).
+  // Driven along with the narrow view, the walls' support is thin (the paper's reason for visiting every
+  // cell).
   const std::vector<Segment> corridor = {{-30, -1, 30, -1}, {-30, 1, 30, 1}};
   for (double x = -8.0; x <= 0.0; x += 0.1) look(corridor, {x, 0.0, 0.0}, 1.0);
   const Pose2 from{-3.0, 0.2, 0.0};
@@ -94,9 +97,11 @@ TEST_F(ContourTest, ACorridorSeenAtSharpAnglesHasNoHoles) {
   for (std::size_t i = 0; i < scan.range_m.size(); ++i) {
     const double a = -kPi + static_cast<double>(i) * 2 * kPi / 3600;
     const double truth = true_range(corridor, from.x_m, from.y_m, std::cos(a), std::sin(a));
-    if (truth > 3.5 || from.x_m + truth * std::cos(a) < -5.5) continue;  // farther back the wall was out of view
+    if (truth > 3.5 || from.x_m + truth * std::cos(a) < -5.5)
+      continue;  // farther back the wall was out of view
     ASSERT_TRUE(std::isfinite(scan.range_m[i])) << "ray at " << a;
-    EXPECT_NEAR(scan.range_m[i] * std::fabs(std::sin(a)), truth * std::fabs(std::sin(a)), 0.03) << "ray at " << a;
+    EXPECT_NEAR(scan.range_m[i] * std::fabs(std::sin(a)), truth * std::fabs(std::sin(a)), 0.03)
+        << "ray at " << a;
   }
 }
 
@@ -127,9 +132,9 @@ TEST_F(ContourTest, UnknownIsNeverFree) {
   look(kRoom, {0.0, 0.0, 0.0}, 1.0);
   RangeScan scan;
   extract_contour(grid_, contour_, {0.0, 0.0, 0.0}, 0.0f, &scan);
-  EXPECT_NEAR(scan.range_m[1800], 4.0, 0.02);    // ahead
-  EXPECT_TRUE(std::isnan(scan.range_m[0]));      // behind
-  EXPECT_TRUE(std::isnan(scan.range_m[900]));    // right
+  EXPECT_NEAR(scan.range_m[1800], 4.0, 0.02);  // ahead
+  EXPECT_TRUE(std::isnan(scan.range_m[0]));    // behind
+  EXPECT_TRUE(std::isnan(scan.range_m[900]));  // right
   EXPECT_EQ(scan.evidence[0], 0.0f);
   for (const float range : scan.range_m) EXPECT_FALSE(std::isinf(range));
 }
@@ -173,7 +178,8 @@ TEST_F(ContourTest, EvidenceFallsWithAge) {
 }
 
 TEST_F(ContourTest, NewestProfileReplacesItsSection) {
-  // The map knows the room; then a box stands 1 m before the camera, which sits 0.2 m ahead of the robot's origin.
+  // The map knows the room; then a box stands 1 m before the camera, which sits 0.2 m ahead of the robot's
+  // origin.
   look(kRoom, {0.0, 0.0, 0.0});
   DepthProfile profile;
   profile.fx_px = 585;

@@ -1,12 +1,11 @@
 // Equation 7, normalised and as printed, against a slow evaluation written out cell by cell.
-#include "core/tsdf_alignment.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
 #include "core/random.h"
+#include "core/tsdf_alignment.h"
 
 namespace knav {
 namespace {
@@ -49,7 +48,7 @@ TEST_F(AlignmentTest, ZeroOnTheSurfaceAndLinearAwayFromIt) {
 }
 
 TEST_F(AlignmentTest, UnknownCellsHaveAPriceAndOffTheGridToo) {
-  EXPECT_FLOAT_EQ(cost_at({3.5, 0, 0}, 0.6f), 0.6f);   // behind the wall: never seen
+  EXPECT_FLOAT_EQ(cost_at({3.5, 0, 0}, 0.6f), 0.6f);  // behind the wall: never seen
   EXPECT_FLOAT_EQ(cost_at({3.5, 0, 0}, 0.25f), 0.25f);
   EXPECT_FLOAT_EQ(cost_at({100.0, 0, 0}, 0.6f), 0.6f);
   EXPECT_FLOAT_EQ(cost_at({-1e6, 1e6, 2.0}, 0.6f), 0.6f);

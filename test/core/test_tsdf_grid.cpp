@@ -1,7 +1,6 @@
-// Hand-worked answers of equations 2-6, and the property that makes the sliding window trustworthy: whatever is
-// added, removed, scrolled and contradicted, a cell holds exactly the sum of what the rules say, to the bit.
-#include "core/tsdf_grid.h"
-
+// Hand-worked answers of equations 2-6, and the property that makes the sliding window trustworthy: whatever
+// is added, removed, scrolled and contradicted, a cell holds exactly the sum of what the rules say, to the
+// bit.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "core/random.h"
+#include "core/tsdf_grid.h"
 
 namespace knav {
 namespace {
@@ -18,7 +18,7 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 TsdfConfig fixed_truncation(double mu_m) {
   TsdfConfig config;
-  config.truncation = {mu_m, 0.0, mu_m, 10.0};  // the paper's
+  config.truncation = {mu_m, 0.0, mu_m, 0.0, 0};  // the paper's
   return config;
 }
 
@@ -43,8 +43,8 @@ DepthProfile profile_of(std::vector<float> z_m, double fx_px) {
 }
 
 TEST(TsdfGrid, ValuesAlongOneRayByHand) {
-  // A wall 2 m ahead of a sensor in the middle of a cell at (0.025, 0.025), mu = 0.4 m, cells of 5 cm. The cell
-  // whose centre is d ahead has F = (2 - d) / 0.4, weight 1 / max(d, 0.5)^2.
+  // A wall 2 m ahead of a sensor in the middle of a cell at (0.025, 0.025), mu = 0.4 m, cells of 5 cm. The
+  // cell whose centre is d ahead has F = (2 - d) / 0.4, weight 1 / max(d, 0.5)^2.
   const TsdfConfig config = fixed_truncation(0.4);
   TsdfGrid grid(config, 6.0);
   TsdfObservation o;
@@ -53,19 +53,21 @@ TEST(TsdfGrid, ValuesAlongOneRayByHand) {
   o.T_map_sensor = {0.025, 0.025, 0.0};
   grid.add(o);
   const auto cell = [](double ahead_m) { return static_cast<int>(std::lround(ahead_m / 0.05)); };
-  EXPECT_NEAR(grid.distance(cell(1.8), 0), 0.5, 1e-3);   // 0.2 m before the wall
-  EXPECT_NEAR(grid.distance(cell(2.0), 0), 0.0, 1e-3);   // on it
-  EXPECT_NEAR(grid.distance(cell(2.3), 0), -0.75, 1e-3); // 0.3 m behind: negative (equation 2 misprints this)
-  EXPECT_FALSE(grid.known(cell(2.45), 0));               // beyond the truncation: null
-  EXPECT_FALSE(grid.known(cell(1.5), 0));                // in front, but nobody saw it free
+  EXPECT_NEAR(grid.distance(cell(1.8), 0), 0.5, 1e-3);  // 0.2 m before the wall
+  EXPECT_NEAR(grid.distance(cell(2.0), 0), 0.0, 1e-3);  // on it
+  EXPECT_NEAR(grid.distance(cell(2.3), 0), -0.75,
+              1e-3);                        // 0.3 m behind: negative (equation 2 misprints this)
+  EXPECT_FALSE(grid.known(cell(2.45), 0));  // beyond the truncation: null
+  EXPECT_FALSE(grid.known(cell(1.5), 0));   // in front, but nobody saw it free
   EXPECT_NEAR(grid.weight(cell(2.0), 0), 1.0 / 4.0, 1e-4);
   EXPECT_NEAR(grid.weight(cell(1.8), 0), 1.0 / 3.24, 1e-4);
-  EXPECT_FALSE(grid.known(0, cell(2.0)));                // beside the view
+  EXPECT_FALSE(grid.known(0, cell(2.0)));  // beside the view
 }
 
 TEST(TsdfGrid, RangeAlongTheRayNotDepth) {
-  // Equation 3: at the edge column of a camera with fx = 1 px a depth of 2 m is a range of 2 sqrt(2) m. The cell at
-  // that point of a 45 degree ray has F = 0, the cell at range 2 m is 0.83 m in front: outside the truncation.
+  // Equation 3: at the edge column of a camera with fx = 1 px a depth of 2 m is a range of 2 sqrt(2) m. The
+  // cell at that point of a 45 degree ray has F = 0, the cell at range 2 m is 0.83 m in front: outside the
+  // truncation.
   const TsdfConfig config = fixed_truncation(0.4);
   TsdfGrid grid(config, 6.0);
   TsdfObservation o;
@@ -80,7 +82,7 @@ TEST(TsdfGrid, RangeAlongTheRayNotDepth) {
 }
 
 TEST(TsdfGrid, TruncationGrowsWithRange) {
-  TruncationConfig truncation{0.4, 0.003, 2.0};
+  TruncationConfig truncation{0.4, 0.003, 2.0, 0.2, 4};
   EXPECT_FLOAT_EQ(truncation.at(0.0f), 0.4f);
   EXPECT_FLOAT_EQ(truncation.at(10.0f), 0.7f);
   EXPECT_FLOAT_EQ(truncation.at(20.0f), 1.6f);
@@ -150,8 +152,8 @@ TEST(TsdfGrid, AScanCarvesTheWholeRayAndNothingWhereItIsUnknown) {
 }
 
 TEST(TsdfGrid, ContradictedSurfaceIsGoneAtOnceAndAWallBesideItStays) {
-  // A post stood 2 m ahead for 200 frames before a wall at 4 m. When it has gone, four frames clear it; the wall
-  // that rays pass at a grazing angle is never contradicted.
+  // A post stood 2 m ahead for 200 frames before a wall at 4 m. When it has gone, four frames clear it; the
+  // wall that rays pass at a grazing angle is never contradicted.
   const TsdfConfig config = fixed_truncation(0.3);
   TsdfGrid grid(config, 12.0);
   RangeScan scan;
@@ -204,7 +206,8 @@ void expect_equals_fresh_sum(const TsdfGrid& grid, const TsdfConfig& config,
                              const std::map<std::uint32_t, TsdfObservation>& held) {
   // A grid of its own for each observation gives that observation's part of every cell.
   const int n = grid.size_cells();
-  std::vector<std::int32_t> sum(static_cast<std::size_t>(n) * static_cast<std::size_t>(n)), weight(sum.size());
+  std::vector<std::int32_t> sum(static_cast<std::size_t>(n) * static_cast<std::size_t>(n)),
+      weight(sum.size());
   TsdfConfig no_reset = config;
   TsdfGrid single(no_reset, 0.5 * n * config.resolution_m);
   for (const auto& [sequence, observation] : held) {
@@ -255,8 +258,9 @@ TEST_P(AddRemoveProperty, ExactWhateverTheOrderWithScrollingAndResets) {
       const bool wild = random.uniform() < 0.5;
       const double wall_m = random.uniform(0.5, 5.0);
       for (std::size_t i = 0; i < 48; ++i) {
-        profile.z_m[i] = wild && random.uniform() < 0.1 ? kNaN
-                                                        : static_cast<float>(wild ? random.uniform(0.05, 5.0) : wall_m);
+        profile.z_m[i] = wild && random.uniform() < 0.1
+                             ? kNaN
+                             : static_cast<float>(wild ? random.uniform(0.05, 5.0) : wall_m);
         profile.free_from_m[i] = 0.5f;
         profile.free_to_m[i] = static_cast<float>(wild ? random.uniform(0.3, 5.0) : wall_m);
       }
