@@ -327,8 +327,6 @@ TEST_F(LocalMapperTest, TheCovarianceIsWideAlongACorridorAndNarrowAcross) {
   world_ = RoomWorld();
   world_.walls = {{-100, -1, 100, -1}, {-100, 1, 100, 1}};
   config_.range_max_m = 6.0;
-  config_.motion.translation_per_translation = 0.1;
-  start();
   config_.filter.particles = 1000;
   start();
   drive(150, 0.025, 0.0);
