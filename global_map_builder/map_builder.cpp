@@ -127,6 +127,28 @@ void mark_surface(const Contour& contour, OccupancyGrid* grid) {
   }
 }
 
+/// The cells whose centres the robot's body was on.
+std::vector<bool> driven_cells(const GridGeometry& g, const Trajectory& trajectory, double radius_m) {
+  std::vector<bool> driven(g.cell_count(), false);
+  if (radius_m <= 0.0) return driven;
+  Pose2 last;
+  bool any = false;
+  for (const StampedPose2& pose : trajectory) {
+    const Pose2& T = pose.T_map_robot;
+    if (any && distance_m(last, T) < 0.5 * g.resolution_m) continue;
+    last = T;
+    any = true;
+    for (int iy = g.cell_y(T.y_m - radius_m); iy <= g.cell_y(T.y_m + radius_m); ++iy) {
+      for (int ix = g.cell_x(T.x_m - radius_m); ix <= g.cell_x(T.x_m + radius_m); ++ix) {
+        if (g.contains(ix, iy) && std::hypot(g.center_x_m(ix) - T.x_m, g.center_y_m(iy) - T.y_m) <= radius_m) {
+          driven[g.index(ix, iy)] = true;
+        }
+      }
+    }
+  }
+  return driven;
+}
+
 }  // namespace
 
 MapBuilder::MapBuilder(const MapBuilderConfig& config, const LocalMapperConfig& mapper)
@@ -173,11 +195,22 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
   map.distance.geometry = geometry;
   map.distance.distance_m = config_.distance == "paper" ? ray_traced_distance_m(geometry, value, 3600)
                                                         : contour_distance_m(geometry, built.contour);
+
+  const Pose2 T_start_odom = drive_.odometry().front().T_map_robot.inverse();
+  for (std::size_t i = 0; i < drive_.trajectory().size(); ++i) {
+    const StampedPose2& pose = drive_.trajectory()[i];
+    map.trajectory.push_back({pose.stamp_s, corrected.at(pose.stamp_s, pose.T_map_robot)});
+    built.odometry.push_back({pose.stamp_s, T_start_odom * drive_.odometry()[i].T_map_robot});
+  }
+
+  const std::vector<bool> driven = driven_cells(geometry, map.trajectory, config_.robot_radius_m);
   map.occupancy.geometry = geometry;
   map.occupancy.value.assign(value.size(), -1);
   for (std::size_t i = 0; i < value.size(); ++i) {
     float& d = map.distance.distance_m[i];
-    if (std::isnan(value[i])) {
+    if (std::isnan(value[i]) && driven[i]) {
+      map.occupancy.value[i] = 0;
+    } else if (std::isnan(value[i])) {
       d = std::numeric_limits<float>::quiet_NaN();
     } else if (value[i] > 0.0f) {
       map.occupancy.value[i] = 0;
@@ -190,12 +223,6 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
   map.keepout.value.assign(geometry.cell_count(), 0);
   end_stage("distance");
 
-  const Pose2 T_start_odom = drive_.odometry().front().T_map_robot.inverse();
-  for (std::size_t i = 0; i < drive_.trajectory().size(); ++i) {
-    const StampedPose2& pose = drive_.trajectory()[i];
-    map.trajectory.push_back({pose.stamp_s, corrected.at(pose.stamp_s, pose.T_map_robot)});
-    built.odometry.push_back({pose.stamp_s, T_start_odom * drive_.odometry()[i].T_map_robot});
-  }
   built.drive = drive_.trajectory();
   return built;
 }

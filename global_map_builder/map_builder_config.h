@@ -91,6 +91,7 @@ struct MapBuilderConfig {
   GraphOptimizerConfig graph;
   SurfaceConfig surface;
   double min_contour_piece_m = 0.25;
+  double robot_radius_m = 0.20;
   std::string distance = "exact";
   double size_max_m = 400.0;
 
@@ -101,6 +102,8 @@ struct MapBuilderConfig {
     v.group("graph", graph, "The optimiser.");
     v.group("surface", surface, "The map's signed distance grid.");
     v.number("min_contour_piece_m", min_contour_piece_m, 0, 5, "m", "Shorter pieces of contour are noise.");
+    v.number("robot_radius_m", robot_radius_m, 0, 2, "m",
+             "Ground that the robot's body, a disc, was on is free, though the Kinect sees none of it; 0 = it says nothing.");
     v.choice("distance", distance, {"exact", "paper"},
              "exact: distance transform of the contour. paper: ray tracing from every cell (minutes).");
     v.number("size_max_m", size_max_m, 5, 2000, "m", "A map larger than this in either direction is refused as an error.");

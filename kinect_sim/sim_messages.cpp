@@ -113,14 +113,16 @@ sensor_msgs::Range range_message(Simulator& simulator, const FrameRequest& reque
 
 visualization_msgs::MarkerArray people_message(const Simulator& simulator) {
   visualization_msgs::MarkerArray message;
+  // Relative to the robot: the world's frame is nowhere in TF, so that nobody navigates by it.
+  const Pose2 T_base_world = simulator.T_world_base().inverse();
   for (const PersonState& person : simulator.people()) {
     visualization_msgs::Marker marker;
     marker.header.stamp.fromSec(simulator.stamp_s());
-    marker.header.frame_id = "world";
+    marker.header.frame_id = "base_link";
     marker.ns = "people";
     marker.id = static_cast<int>(message.markers.size());
     marker.type = visualization_msgs::Marker::CYLINDER;
-    marker.pose = pose_message(person.T_world_person);
+    marker.pose = pose_message(T_base_world * person.T_world_person);
     marker.pose.position.z = person.height_m / 2;
     marker.scale.x = marker.scale.y = 2 * person.radius_m;
     marker.scale.z = person.height_m;

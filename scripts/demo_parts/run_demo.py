@@ -322,8 +322,9 @@ class Demo:
 
     def summarize(self, mapping, evaluation, goals, mapping_measured, navigation_measured, results):
         navigation = recordings.Recording(self.out / "navigation.bag")
-        alignment = evaluation["T_world_map"]
-        world_map = (alignment["x_m"], alignment["y_m"], alignment["yaw_rad"])
+        world_map = recordings.compose(mapping.truth.poses[0],
+                                       (evaluation["alignment_x_m"], evaluation["alignment_y_m"],
+                                        math.radians(evaluation["alignment_yaw_deg"])))
         map_world = recordings.inverse(world_map)
         errors, angles = recordings.position_errors(navigation.estimate, navigation.truth, world_map)
         if not errors:
@@ -353,7 +354,7 @@ class Demo:
             "navigation": navigation_measured,
             "goals": results,
             "goal_reached_within_m": REACHED_WITHIN_M,
-            "T_world_map": alignment,
+            "T_world_map": dict(zip(("x_m", "y_m", "yaw_rad"), world_map)),
             "seed": self.options.seed,
             "date": datetime.date.today().isoformat(),
             "processor": processor(),
