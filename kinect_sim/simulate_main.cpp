@@ -45,7 +45,7 @@ double depth_seconds(const std::string& text) {
     if (used == text.size() && seconds >= 0.0) return seconds;
   } catch (const std::exception&) {
   }
-  throw knav::UserError("--depth: '" + text + "' must be none, all or a number of seconds.");
+  throw knav::UserError("--depth: '" + text + "' must be none, all, standing or a number of seconds.");
 }
 
 }  // namespace
@@ -66,7 +66,8 @@ int main(int argc, char** argv) {
   app.add_option("--device-seed", device_seed, "Which Kinect and which base")->check(CLI::NonNegativeNumber);
   app.add_option("--sensor", sensor, "ideal | calibrated | default | harsh");
   app.add_option("--odometry", odometry_preset, "perfect | default | bad");
-  app.add_option("--depth", depth, "Raw depth to record: none, all, or its first SECONDS (18 MB a second)");
+  app.add_option("--depth", depth, "Raw depth to record: none, all, standing (while the robot stands still) or its first SECONDS "
+                 "(18 MB a second)");
   app.add_option("--compression", compression, "none | lz4 | bz2")
       ->check(CLI::IsMember({"none", "lz4", "bz2"}));
   app.add_flag("--lidar", options.lidar, "Record lidar_scan too (180 deg, 361 rays, 10 Hz)");
@@ -76,7 +77,8 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
 
   return knav::run_program("simulate", [&] {
-    options.depth_s = depth_seconds(depth);
+    options.depth_standing_only = depth == "standing";
+    options.depth_s = depth_seconds(options.depth_standing_only ? "all" : depth);
     knav::SimulatorConfig config =
         knav::read_config_section<knav::SimulatorNodeConfig>(config_file, "simulator");
     if (seed >= 0) config.seed = seed;

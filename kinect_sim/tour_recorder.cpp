@@ -44,7 +44,9 @@ class Recorder {
   bool frame(const FrameRequest& request) {
     if (!bag_) return false;
     const double now_s = simulator_.stamp_s();
-    const bool with_depth = request.stamp_s - simulator_.config().start_time_s < options_.depth_s;
+    const bool standing = std::abs(simulator_.robot().v_mps()) < 1e-3 && std::abs(simulator_.robot().w_radps()) < 1e-3;
+    const bool with_depth = request.stamp_s - simulator_.config().start_time_s < options_.depth_s &&
+                            (standing || !options_.depth_standing_only);
     if (with_depth) {
       image_.header.stamp.fromSec(request.stamp_s);
       cv::Mat view = depth_view(&image_);

@@ -17,6 +17,7 @@ namespace knav {
 /// What goes into the recording of a tour.
 struct RecordingOptions {
   double depth_s = 0.0;  ///< raw depth for the first so many seconds; +Inf = all, 0 = none
+  bool depth_standing_only = false;  ///< of these, the frames taken while the robot stands still
   bool lidar = false;    ///< lidar_scan at 10 Hz
   bool range = false;    ///< range: the distance straight ahead of the camera, at 10 Hz
   double odom_rate_hz = 50.0;

@@ -122,7 +122,7 @@ class Demo:
         self.calibration = self.out / "calibration.yaml"
         walls = self.out / "calibration.bag"
         self.program("simulate", self.worlds / "flat_wall.yaml", "--script", self.worlds / "flat_wall_tour.yaml",
-                     "--record", walls, "--range", "--depth", "all", "--seed", self.options.seed)
+                     "--record", walls, "--range", "--depth", "standing", "--seed", self.options.seed)
         self.program("calibrate_depth", walls, "--out", self.calibration, "--json", self.out / "calibration.json",
                      "--report", self.out / "calibration.txt")
         walls.unlink()
