@@ -55,7 +55,8 @@ float value_in(std::uint32_t quad, float tx, float ty) {
   return known > 0.0f ? sum / known : kNaN;
 }
 
-constexpr std::uint32_t kAllFree = 0x7F7F7F7Fu, kAllUnknown = 0x80808080u;
+constexpr std::uint32_t kSigns = 0x80808080u;  // set in a corner that is negative or unknown
+constexpr std::uint32_t kAllUnknown = 0x80808080u;
 
 float newest_seen(const TsdfGrid& grid, int ix, int iy) {
   float seen = 0.0f;
@@ -78,8 +79,12 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
   double entered = 0.0;       // where the ray entered the present quad
   double unknown_from = 0.0;  // where the present stretch of unknown began
   double positive_at = -1.0;  // the last place where F was known and positive, without unknown since
-  float positive_value = 0.0f;
+  int positive_ix = 0, positive_iy = 0;  // its quad; the value there is only worked out at a crossing
   RayEnd end;
+  const auto value_at = [&](int ix, int iy, double t) {
+    return value_in(quads[grid.index(ix, iy)], static_cast<float>(x + t * dir_x - ix),
+                    static_cast<float>(y + t * dir_y - iy));
+  };
   const auto inside = static_cast<unsigned>(grid.size_cells() - 1);
   const int first_x = grid.first_x(), first_y = grid.first_y();
   while (entered < length) {
@@ -88,9 +93,10 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
       break;
     const double leaves = std::min(walk.leaves_at(), length);
     const std::uint32_t quad = quads[grid.index(walk.ix, walk.iy)];
-    if (quad == kAllFree) {
+    if ((quad & kSigns) == 0 && quad != 0) {  // all corners known and none negative
       positive_at = leaves;
-      positive_value = TsdfGrid::kValueScale;
+      positive_ix = walk.ix;
+      positive_iy = walk.iy;
       unknown_from = leaves;
     } else if (quad == kAllUnknown) {
       positive_at = -1.0;  // positive next to unknown is no surface
@@ -98,15 +104,16 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
     } else {
       // The middle and the far edge of the ray's way through the quad.
       for (const double t : {0.5 * (entered + leaves), leaves}) {
-        const auto tx = static_cast<float>(x + t * dir_x - walk.ix),
-                   ty = static_cast<float>(y + t * dir_y - walk.iy);
-        const float value = value_in(quad, tx, ty);
+        const float value = value_at(walk.ix, walk.iy, t);
         if (value > 0.0f) {
           positive_at = t;
-          positive_value = value;
+          positive_ix = walk.ix;
+          positive_iy = walk.iy;
         } else {
           if (positive_at >= 0.0) {
-            const double back = (t - positive_at) * static_cast<double>(-value / (positive_value - value));
+            const float before = value_at(positive_ix, positive_iy, positive_at);
+            const double share = before > value ? static_cast<double>(-value / (before - value)) : 0.0;
+            const double back = (t - positive_at) * share;
             end.kind = RayEnd::Kind::kSurface;
             end.range_m = static_cast<float>((t - back) * grid.resolution_m());
             end.last_seen_s = newest_seen(grid, walk.ix, walk.iy);

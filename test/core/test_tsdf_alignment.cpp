@@ -69,6 +69,22 @@ TEST_F(AlignmentTest, AgreesWithTheWrittenOutSum) {
   }
 }
 
+TEST_F(AlignmentTest, WhatComesNewlyIntoViewHasNoSay) {
+  // Half of the hypotheses see the second reading beyond the mapped view, all of them the first, none the
+  // third.
+  ParticleSet particles;
+  particles.resize(4);
+  for (std::size_t i = 0; i < 4; ++i) particles.set(i, {0.0, i < 2 ? 0.0 : 2.0, 0.0});
+  points_.clear();
+  points_.add(2.0f, -1.0f, 1.0f);  // at y = -1 or 1: on the wall's mapped stretch of +-1.37 m
+  points_.add(2.0f, 0.5f, 1.0f);   // at y = 0.5 or 2.5
+  points_.add(2.0f, 9.0f, 1.0f);
+  weigh_by_known_share(grid_, particles, 4, &points_);
+  EXPECT_FLOAT_EQ(points_.weight[0], 1.0f);
+  EXPECT_FLOAT_EQ(points_.weight[1], 0.25f);
+  EXPECT_FLOAT_EQ(points_.weight[2], 0.0f);
+}
+
 TEST_F(AlignmentTest, PaperCostIsTheSumOfWeightedDistancesAndUnknownCostsNothing) {
   ParticleSet particles;
   particles.resize(2);
