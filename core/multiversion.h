@@ -2,9 +2,9 @@
 
 /// KNAV_MULTIVERSION compiles a function for plain x86-64 and for AVX2 machines; the program chooses at run time.
 /// Both give the same bytes: the build switches off fused multiply-add (-ffp-contract=off), and such functions must
-/// not reorder floating point sums.
+/// not reorder floating point sums. Sanitizers cannot run code in a resolver, hence no versions there.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
+    !defined(__SANITIZE_THREAD__) && defined(__OPTIMIZE__)
 #define KNAV_MULTIVERSION __attribute__((target_clones("default", "avx2")))
 #else
 #define KNAV_MULTIVERSION

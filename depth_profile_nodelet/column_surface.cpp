@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "kinect_calib/multiversion.h"
+#include "core/multiversion.h"
 
 namespace knav {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "core/pose2.h"
 #include "kinect_calib/kinect_noise.h"
-#include "kinect_calib/multiversion.h"
+#include "core/multiversion.h"
 
 namespace knav {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "depth_profile_nodelet/profile_extractor.h"
 #include "kinect_calib/kinect_noise.h"
-#include "kinect_calib/multiversion.h"
+#include "core/multiversion.h"
 
 namespace knav {
 namespace {

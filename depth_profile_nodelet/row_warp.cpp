@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "kinect_calib/multiversion.h"
+#include "core/multiversion.h"
 
 namespace knav {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "core/error.h"
-#include "kinect_calib/multiversion.h"
+#include "core/multiversion.h"
 
 namespace knav {
 namespace {

@@ -1,13 +1,12 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/file_io.h"
 #include "global_map_builder/map_directory.h"
 #include "kinect_sim/map_evaluation.h"
-#include "ros_common/program.h"
+#include "ros_common/command_line.h"
 
 namespace {
 
@@ -42,9 +41,7 @@ int main(int argc, char** argv) {
   app.add_option("--match", config.match_m, "How near contour must lie [m]")->check(CLI::Range(0.01, 1.0));
   app.add_option("--json", json, "JSON file to write (- for standard output)");
   app.add_option("--picture", picture, "PNG file to write");
-  CLI11_PARSE(app, argc, argv);
-
-  return knav::run_program("evaluate_map", [&] {
+  return knav::run_command(app, argc, argv, [&] {
     const knav::MapDirectory map = knav::load_map(map_path);
     const knav::WorldConfig world = knav::load_world(world_path);
     const knav::Trajectory truth = knav::read_trajectory(truth_path);

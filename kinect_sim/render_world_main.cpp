@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/error.h"
@@ -8,7 +7,7 @@
 #include "kinect_sim/simulator.h"
 #include "kinect_sim/tour.h"
 #include "kinect_sim/world_picture.h"
-#include "ros_common/program.h"
+#include "ros_common/command_line.h"
 
 namespace {
 
@@ -36,9 +35,7 @@ int main(int argc, char** argv) {
   app.add_option("--sensor", sensor, "ideal | calibrated | default | harsh")
       ->check(CLI::IsMember(knav::KinectConfig::preset_names()));
   app.add_option("--far", far_m, "Depth [m] at the end of the colour scale");
-  CLI11_PARSE(app, argc, argv);
-
-  return knav::run_program("render_world", [&] {
+  return knav::run_command(app, argc, argv, [&] {
     if (top_view && *view_option)
       throw knav::UserError("--top-view and --view exclude each other; give one.");
     const knav::WorldConfig world = knav::load_world(world_path);

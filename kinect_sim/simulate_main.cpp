@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <rosbag/bag.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,7 +11,7 @@
 #include "core/file_io.h"
 #include "kinect_sim/simulator_node_config.h"
 #include "kinect_sim/tour_recorder.h"
-#include "ros_common/program.h"
+#include "ros_common/command_line.h"
 
 namespace {
 
@@ -74,9 +73,7 @@ int main(int argc, char** argv) {
   app.add_flag("--range", options.range,
                "Record range too: the true distance straight ahead, for calibration");
   app.add_option("--json", json, "Write figures as JSON (- for standard output)");
-  CLI11_PARSE(app, argc, argv);
-
-  return knav::run_program("simulate", [&] {
+  return knav::run_command(app, argc, argv, [&] {
     options.depth_standing_only = depth == "standing";
     options.depth_s = depth_seconds(options.depth_standing_only ? "all" : depth);
     knav::SimulatorConfig config =
