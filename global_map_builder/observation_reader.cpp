@@ -185,6 +185,7 @@ class ObservationReader::Impl {
         if (found || (message.getTime() - *start).toSec() > kTransformSearch_s) throw Found{};
       });
     }
+    if (found && start && source_ == "depth") follow_mount(transforms, sensor);
     if (found) {
       T_plane_ = source_ == "scan" ? planar(T_base_sensor_) : planar_optical(T_base_sensor_);
       upside_down_ = source_ == "scan" && T_base_sensor_.linear()(2, 2) < 0.0;
@@ -194,6 +195,19 @@ class ObservationReader::Impl {
                                             bag_.path(), base_frame_, sensor);
     if (source_ == "depth") throw UserError(missing + "; the camera's height and tilt must be known.");
     warnings_.push_back(missing + "; taking the sensor to be at the robot's centre, looking forward.");
+  }
+
+  /// The mount came from `tf`: it may move, and then every frame has its own.
+  void follow_mount(FixedTransforms transforms, const std::string& sensor) {
+    bag_.for_each({"tf"}, [&](const rosbag::MessageInstance& message, double) {
+      const auto tf = instantiate<tf2_msgs::TFMessage>(message);
+      for (const auto& transform : tf->transforms) {
+        const bool above_base = without_leading_slash(transform.child_frame_id) == base_frame_;
+        Eigen::Isometry3d T_base_sensor;
+        if (above_base || !transforms.replace(transform) || !transforms.find(base_frame_, sensor, &T_base_sensor)) continue;
+        mount_.add(transform.header.stamp.toSec(), T_base_sensor);
+      }
+    });
   }
 
   void find_camera() {
@@ -366,6 +380,10 @@ class ObservationReader::Impl {
     }
     const cv::Mat depth(static_cast<int>(image.height), static_cast<int>(image.width), millimetres ? CV_16UC1 : CV_32FC1,
                         const_cast<std::uint8_t*>(image.data.data()), image.step);
+    if (!mount_.empty()) {
+      T_base_sensor_ = mount_.at(stamp_s);
+      T_plane_ = planar_optical(T_base_sensor_);
+    }
     if (front_end_->process(depth, camera_, stamp_s, T_base_sensor_, pose_buffer_, &profile_)) return true;
     last_fault_ = front_end_->fault();
     return false;
@@ -391,6 +409,7 @@ class ObservationReader::Impl {
   ObservationReaderConfig config_;
   std::string source_, topic_, odometry_topic_, base_frame_;
   Eigen::Isometry3d T_base_sensor_ = Eigen::Isometry3d::Identity();
+  MovingTransform mount_;
   Pose2 T_plane_;
   bool upside_down_ = false;
   RawCamera camera_;
