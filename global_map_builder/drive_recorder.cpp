@@ -6,6 +6,8 @@
 namespace knav {
 namespace {
 
+constexpr double kBreakScale = 10.0;  // how much less a step is trusted when the mapper lost the thread
+
 bool moved(const Pose2& a, const Pose2& b, double distance, double angle_deg) {
   return distance_m(a, b) >= distance ||
          std::fabs(normalize_angle_rad(b.yaw_rad - a.yaw_rad)) >= angle_deg * kPi / 180.0;
@@ -13,7 +15,7 @@ bool moved(const Pose2& a, const Pose2& b, double distance, double angle_deg) {
 
 /// Of the step from one keyframe to the next, in the axes of the latter.
 Eigen::Matrix3d step_covariance(const DriveConfig& config, double path_m, double turn_rad, bool after_break) {
-  const double scale = after_break ? 10.0 : 1.0;
+  const double scale = after_break ? kBreakScale : 1.0;
   const double root = std::sqrt(std::max(path_m, 1e-3));
   const double position = scale * (config.position_sd_floor_m + config.position_sd_per_m * root);
   const double heading =
@@ -42,6 +44,12 @@ void DriveRecorder::take(const Observation& observation, const Pose2& T_base_sen
     T_drive_local_ = T_drive_base * result.T_local_base.inverse();
     break_pending_ = true;
     ++breaks_;
+    // The mapper notices late that it went astray: what it said just before is not to be trusted either.
+    for (PoseGraphEdge& edge : edges_) {
+      if (keyframes_[static_cast<std::size_t>(edge.to)].stamp_s > result.stamp_s - config_.doubt_before_break_s) {
+        edge.information /= kBreakScale * kBreakScale;
+      }
+    }
   }
   epoch_ = result.epoch;
   const Pose2 T_drive_base = T_drive_local_ * result.T_local_base;

@@ -21,6 +21,7 @@ struct DriveConfig {
   double heading_sd_deg_per_m = 0.4;
   double heading_sd_per_turn = 0.01;
   double filter_share = 0.05;
+  double doubt_before_break_s = 4.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -36,6 +37,8 @@ struct DriveConfig {
     v.number("heading_sd_per_turn", heading_sd_per_turn, 0, 1, "rad/rad", "Heading error (sd) per angle turned.");
     v.number("filter_share", filter_share, 0, 1, "",
              "Share of the mapper's own covariance that is added to a step's.");
+    v.number("doubt_before_break_s", doubt_before_break_s, 0, 60, "s",
+             "When the mapper lost the thread, steps of this long before are trusted little.");
   }
   std::vector<std::string> validate() const { return {}; }
 };
@@ -44,9 +47,9 @@ struct DriveConfig {
 struct ClosureConfig {
   bool automatic = true;
   bool buttons = true;
-  double submap_half_length_m = 3.0;
+  double submap_half_length_m = 5.0;
   double submap_spacing_m = 1.5;
-  double submap_range_max_m = 8.0;
+  double submap_range_max_m = 10.0;
   double min_path_m = 12.0;
   double search_base_m = 1.0;
   double search_per_m = 0.03;

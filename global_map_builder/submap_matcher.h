@@ -11,10 +11,10 @@ namespace knav {
 
 struct MatchConfig {
   double min_surface_m = 4.0;
-  double min_overlap = 0.4;
-  double min_agreement = 0.75;
+  double min_overlap = 0.35;
+  double min_agreement = 0.8;
   double max_residual_m = 0.08;
-  double max_rival = 0.92;
+  double max_rival = 0.85;
   double rival_distance_m = 0.5;
   double rival_angle_deg = 8.0;
 
