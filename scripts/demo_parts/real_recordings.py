@@ -65,8 +65,10 @@ def depth(work, name, out):
     axes[0].set_ylabel("frame")
     axes[0].set_title("depth profiles [m]; white: no obstacle seen")
     figure.colorbar(image, ax=axes[0])
-    axes[1].imshow(matplotlib.image.imread(work / name / "scan_360.png"))
-    axes[1].set_title("local map and virtual scan at the end")
+    picture = matplotlib.image.imread(work / name / "scan_360.png")
+    quarter = [side * 3 // 8 for side in picture.shape[:2]]  # the middle 5 m of 20
+    axes[1].imshow(picture[quarter[0]:-quarter[0], quarter[1]:-quarter[1]])
+    axes[1].set_title("local map and virtual scan at the end, 5 x 5 m")
     axes[1].axis("off")
     figure.tight_layout()
     figure.savefig(out / f"{name}.png", dpi=80)
