@@ -23,8 +23,8 @@ using Json = nlohmann::json;
 const char* const kFooter = R"(DIR receives map.yaml, map.pgm (map_server's format), distance.tiff (float32 m, signed, NaN unknown), keepout.pgm,
 places.yaml, trajectory.tum, graph.g2o, closures.json, map.png and metadata.yaml.
 The JSON of --json holds source, observations (count), frames_used, path_m, keyframes, marks, breaks (times the mapper
-lost the thread), closures {found, accepted, button, automatic}, graph {chi2, iterations}, map {width_m, height_m,
-contour_m, checksum}, time_s {read, closures, surface, distance, total}, recording_s, memory_mb, seed.
+lost the thread), mended_steps (its jumps, mended), closures {found, accepted, button, automatic}, graph {chi2, iterations}, map {width_m, height_m,
+contour_m, checksum}, time_s {read, refinement, closures, surface, distance, total}, recording_s, memory_mb, seed.
 closures.json holds, for each, from_stamp_s, to_stamp_s, source, matched, accepted, reason, x_m, y_m, yaw_rad (of the
 later pose in the earlier), score, overlap, agreement, residual_m, rival, chi2.)";
 
@@ -186,6 +186,7 @@ void build_map(const Options& options) {
       {"keyframes", drive.keyframes().size()},
       {"marks", read.marks},
       {"breaks", drive.breaks()},
+      {"mended_steps", built.mended_steps},
       {"closures",
        {{"found", built.closures.size()}, {"accepted", accepted}, {"button", by_button}, {"automatic", accepted - by_button}}},
       {"graph", {{"chi2", chi2(built.graph)}, {"edges", built.graph.edges.size()}}},
@@ -196,6 +197,7 @@ void build_map(const Options& options) {
         {"checksum", built.map.checksum}}},
       {"time_s",
        {{"read", read_s},
+        {"refinement", built.stage_s["refinement"]},
         {"closures", built.stage_s["closures"]},
         {"surface", built.stage_s["surface"]},
         {"distance", built.stage_s["distance"]},

@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "global_map_builder/corrected_drive.h"
+
 namespace knav {
 namespace {
 
@@ -64,12 +66,12 @@ void DriveRecorder::take(const Observation& observation, const Pose2& T_base_sen
   const bool usable = result.outcome != FrameOutcome::kSuspicious;
   if (usable && (frames_.empty() || result.stamp_s - frames_.back().stamp_s >= config_.frame_period_s ||
                  moved(frames_.back().T_drive_base, T_drive_base, config_.frame_distance_m, config_.frame_angle_deg))) {
-    frames_.push_back({result.stamp_s, path_m_, T_drive_base, T_base_sensor, observation});
+    frames_.push_back({result.stamp_s, path_m_, T_drive_base, result.T_odom_base, T_base_sensor, observation});
   }
 }
 
 void DriveRecorder::add_keyframe(const LocalMapperResult& result, const Pose2& T_drive_base) {
-  Keyframe keyframe{result.stamp_s, path_m_, T_drive_base, break_pending_, mark_pending_};
+  Keyframe keyframe{result.stamp_s, path_m_, T_drive_base, result.T_odom_base, break_pending_, mark_pending_};
   if (!keyframes_.empty()) {
     const Keyframe& before = keyframes_.back();
     PoseGraphEdge edge;
@@ -89,6 +91,17 @@ void DriveRecorder::add_keyframe(const LocalMapperResult& result, const Pose2& T
   }
   keyframes_.push_back(keyframe);
   break_pending_ = mark_pending_ = false;
+}
+
+void DriveRecorder::adjust(const std::vector<Pose2>& T_drive_keyframe, const std::vector<Eigen::Matrix3d>& added) {
+  const CorrectedDrive corrected(keyframes_, T_drive_keyframe);
+  for (DriveFrame& frame : frames_) frame.T_drive_base = corrected.at(frame.stamp_s, frame.T_drive_base);
+  for (StampedPose2& pose : trajectory_) pose.T_map_robot = corrected.at(pose.stamp_s, pose.T_map_robot);
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) keyframes_[i].T_drive_base = T_drive_keyframe[i];
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    edges_[i].T_from_to = T_drive_keyframe[i].inverse() * T_drive_keyframe[i + 1];
+    edges_[i].information = (edges_[i].information.inverse() + added[i]).inverse();
+  }
 }
 
 template void DriveRecorder::take(const DepthProfile&, const Pose2&);

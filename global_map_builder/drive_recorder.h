@@ -17,6 +17,7 @@ struct DriveFrame {
   double stamp_s = 0.0;
   double path_m = 0.0;
   Pose2 T_drive_base;
+  Pose2 T_odom_base;
   Pose2 T_base_sensor;
   std::variant<DepthProfile, RangeScan> data;
 };
@@ -26,6 +27,7 @@ struct Keyframe {
   double stamp_s = 0.0;
   double path_m = 0.0;
   Pose2 T_drive_base;
+  Pose2 T_odom_base;
   bool after_break = false;  ///< the mapper lost the thread before it; the edge to here is odometry's
   bool marked = false;       ///< the button was pressed here
 };
@@ -41,6 +43,11 @@ class DriveRecorder {
   void add(const RangeScan& scan, const Pose2& T_base_sensor) { take(scan, T_base_sensor); }
   /// The next frame stands at a marked place.
   void mark(double /*stamp_s*/) { mark_pending_ = true; }
+
+  /// Moves the keyframes, and with them frames and trajectory; edges become the steps between the new poses.
+  /// @param T_drive_keyframe one per keyframe
+  /// @param step_covariance added to each edge's own; one per edge
+  void adjust(const std::vector<Pose2>& T_drive_keyframe, const std::vector<Eigen::Matrix3d>& step_covariance);
 
   const std::vector<DriveFrame>& frames() const { return frames_; }
   const std::vector<Keyframe>& keyframes() const { return keyframes_; }

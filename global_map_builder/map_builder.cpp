@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "global_map_builder/contour_distance.h"
 #include "global_map_builder/corrected_drive.h"
+#include "global_map_builder/drive_smoother.h"
 #include "global_map_builder/submap.h"
 
 namespace knav {
@@ -173,6 +174,9 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
     if (progress) progress(stage, fraction);
   };
 
+  built.mended_steps = smooth_drive(config_.refinement, config_.graph, config_.surface, &drive_,
+                                    [&](double fraction) { report("refinement", fraction); });
+  end_stage("refinement");
   ClosureFinder finder(config_, drive_);
   finder.run([&](double fraction) { report("closures", fraction); });
   built.graph = finder.graph();

@@ -21,6 +21,7 @@ struct BuiltMap {
   std::vector<Closure> closures;
   std::vector<Pose2> keyframes;        ///< T_map_base, by the numbers that closures use
   Trajectory drive, odometry;          ///< uncorrected, at the map trajectory's stamps, from the origin
+  int mended_steps = 0;                ///< where the mapper jumped
   std::map<std::string, double> stage_s;
 };
 
@@ -41,7 +42,7 @@ class MapBuilder {
   const DriveRecorder& drive() const { return drive_; }
 
   /// @param progress stage and the fraction of it done; may throw to stop
-  /// UserError if nothing that can be mapped was added.
+  /// UserError if nothing that can be mapped was added. Call once.
   BuiltMap build(const std::function<void(const char* stage, double fraction)>& progress = {});
 
  private:

@@ -88,8 +88,43 @@ struct ClosureConfig {
   std::vector<std::string> validate() const { return {}; }
 };
 
+/// Finding and mending the mapper's jumps, with edges between keyframes a few metres apart by direct alignment.
+struct RefinementConfig {
+  bool enabled = true;
+  double half_length_m = 0.5;
+  double range_max_m = 8.0;
+  std::vector<double> spans_m = {1.5, 3.0, 6.0};
+  double max_change_m = 0.3;
+  double position_sd_m = 0.03;
+  double heading_sd_deg = 0.6;
+  double odometry_sd_factor = 1.5;
+  double jump_chi2 = 20.0;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.flag("enabled", enabled, "Look for jumps of the mapper and mend them.");
+    v.number("half_length_m", half_length_m, 0.05, 10, "m", "What was seen this far before and after a keyframe.");
+    v.number("range_max_m", range_max_m, 1, 50, "m", "Readings up to this range.");
+    v.list("spans_m", spans_m, "m", "Distances along the drive between the keyframes that are aligned.");
+    v.number("max_change_m", max_change_m, 0.01, 5, "m", "An alignment farther from the mapper's estimate is ignored.");
+    v.number("position_sd_m", position_sd_m, 1e-3, 1, "m", "How well such an alignment is trusted (sd).");
+    v.number("heading_sd_deg", heading_sd_deg, 0.01, 20, "deg", "How well its heading is trusted (sd).");
+    v.number("odometry_sd_factor", odometry_sd_factor, 0.1, 100, "",
+             "Odometry is trusted to this times its usual deviation from the mapper.");
+    v.number("jump_chi2", jump_chi2, 1, 1e9, "",
+             "A step of the mapper that parts from odometry by more than this (squared, in usual deviations) is a jump.");
+  }
+  std::vector<std::string> validate() const {
+    for (const double span : spans_m) {
+      if (!(span > 2.0 * half_length_m)) return {"refinement/spans_m must each exceed twice refinement/half_length_m."};
+    }
+    return {};
+  }
+};
+
 struct MapBuilderConfig {
   DriveConfig drive;
+  RefinementConfig refinement;
   ClosureConfig closures;
   GraphOptimizerConfig graph;
   SurfaceConfig surface;
@@ -101,6 +136,7 @@ struct MapBuilderConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v.group("drive", drive, "Frames, keyframes and the edges between them.");
+    v.group("refinement", refinement, "Direct alignment along the drive.");
     v.group("closures", closures, "Visits of the same place.");
     v.group("graph", graph, "The optimiser.");
     v.group("surface", surface, "The map's signed distance grid.");
@@ -112,7 +148,7 @@ struct MapBuilderConfig {
     v.number("size_max_m", size_max_m, 5, 2000, "m", "A map larger than this in either direction is refused as an error.");
   }
   std::vector<std::string> validate() const {
-    std::vector<std::string> faults;
+    std::vector<std::string> faults = refinement.validate();
     if (drive.keyframe_distance_m < drive.frame_distance_m) {
       faults.push_back("drive/keyframe_distance_m must not be below drive/frame_distance_m.");
     }

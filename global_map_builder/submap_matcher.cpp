@@ -205,9 +205,9 @@ Agreement agreement_of(const Submap& from, const Submap& to, const Pose2& T_from
 }
 
 /// Map-axes Hessian of `from`'s frame to the edge's error, which lies in the axes of `to`.
-Eigen::Matrix3d information_of(const Fit& fit) {
-  // Neighbouring points share their noise: count one in three, each of 5 cm. Nothing is better known than 2 cm and
-  // 0.3 deg, and a direction left open is known to 1 m.
+/// @param floor_m, floor_rad  standard deviations that no match undercuts
+Eigen::Matrix3d information_of(const Fit& fit, double floor_m, double floor_rad) {
+  // Neighbouring points share their noise: count one in three, each of 5 cm. A direction left open is known to 1 m.
   const double per_point = 1.0 / (3.0 * 0.05 * 0.05);
   const Eigen::Matrix3d weak = Eigen::Vector3d(1.0, 1.0, 30.0).asDiagonal();
   // A straight wall's contour waves by a few degrees, which looks like a hold along the wall: take that out.
@@ -219,12 +219,35 @@ Eigen::Matrix3d information_of(const Fit& fit) {
   shrink.topLeftCorner<2, 2>() = axes.eigenvectors() * share.asDiagonal() * axes.eigenvectors().transpose();
   hessian = shrink * hessian * shrink;
   Eigen::Matrix3d covariance = (hessian * per_point + weak).inverse();
-  covariance += Eigen::Vector3d(4e-4, 4e-4, 2.7e-5).asDiagonal().toDenseMatrix();
+  covariance += Eigen::Vector3d(floor_m * floor_m, floor_m * floor_m, floor_rad * floor_rad).asDiagonal().toDenseMatrix();
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   const double c = std::cos(fit.pose.yaw_rad), s = std::sin(fit.pose.yaw_rad);
   R.topLeftCorner<2, 2>() << c, -s, s, c;
   const Eigen::Matrix3d information = (R.transpose() * covariance * R).inverse();
   return 0.5 * (information + information.transpose());
+}
+
+/// Fills in what both directions agree on, and the verdict.
+void judge(const MatchConfig& config, const Submap& from, const Submap& to, MatchResult* result) {
+  const Agreement there = agreement_of(from, to, result->T_from_to);
+  const Agreement back = agreement_of(to, from, result->T_from_to.inverse());
+  result->overlap = std::min(there.overlap, back.overlap);
+  result->agreement = std::min(there.agreement, back.agreement);
+  result->residual_m = std::max(there.residual_m, back.residual_m);
+  result->surface_m = std::min(there.surface_m, back.surface_m);
+  if (result->surface_m < config.min_surface_m) {
+    result->reason = fmt::format("only {:.1f} m of wall coincide", result->surface_m);
+  } else if (result->overlap < config.min_overlap) {
+    result->reason = fmt::format("overlap {:.2f} is too small", result->overlap);
+  } else if (result->agreement < config.min_agreement) {
+    result->reason = fmt::format("only {:.2f} of what both saw agrees", result->agreement);
+  } else if (result->residual_m > config.max_residual_m) {
+    result->reason = fmt::format("residual {:.3f} m is too large", result->residual_m);
+  } else if (result->rival > config.max_rival) {
+    result->reason = fmt::format("another alignment scores {:.2f} of the best", result->rival);
+  } else {
+    result->accepted = true;
+  }
 }
 
 }  // namespace
@@ -247,13 +270,7 @@ MatchResult match_submaps(const MatchConfig& config, const Submap& from, const S
   const Fit& best = fits.front();
   result.T_from_to = best.pose;
   result.score = best.score;
-  result.information = information_of(best);
-  const Agreement there = agreement_of(from, to, best.pose);
-  const Agreement back = agreement_of(to, from, best.pose.inverse());
-  result.overlap = std::min(there.overlap, back.overlap);
-  result.agreement = std::min(there.agreement, back.agreement);
-  result.residual_m = std::max(there.residual_m, back.residual_m);
-  result.surface_m = std::min(there.surface_m, back.surface_m);
+  result.information = information_of(best, 0.02, 0.005);
   for (std::size_t i = 1; i < fits.size(); ++i) {
     if (same_place(config, fits[i].pose, best.pose)) continue;
     const Pose2 apart = best.pose.inverse() * fits[i].pose;
@@ -261,19 +278,22 @@ MatchResult match_submaps(const MatchConfig& config, const Submap& from, const S
     if (error.dot(result.information * error) < 9.0) continue;  // along a direction left open
     result.rival = std::max(result.rival, fits[i].score / best.score);
   }
-  if (result.surface_m < config.min_surface_m) {
-    result.reason = fmt::format("only {:.1f} m of wall coincide", result.surface_m);
-  } else if (result.overlap < config.min_overlap) {
-    result.reason = fmt::format("overlap {:.2f} is too small", result.overlap);
-  } else if (result.agreement < config.min_agreement) {
-    result.reason = fmt::format("only {:.2f} of what both saw agrees", result.agreement);
-  } else if (result.residual_m > config.max_residual_m) {
-    result.reason = fmt::format("residual {:.3f} m is too large", result.residual_m);
-  } else if (result.rival > config.max_rival) {
-    result.reason = fmt::format("another alignment scores {:.2f} of the best", result.rival);
-  } else {
-    result.accepted = true;
+  judge(config, from, to, &result);
+  return result;
+}
+
+MatchResult align_submaps(const MatchConfig& config, const Submap& from, const Submap& to, const Pose2& T_from_to) {
+  MatchResult result;
+  result.T_from_to = T_from_to;
+  if (from.empty() || to.empty()) {
+    result.reason = "nothing was seen at one of the two places";
+    return result;
   }
+  const Fit fit = refine(from, to, T_from_to);
+  result.T_from_to = fit.pose;
+  result.score = fit.score;
+  result.information = information_of(fit, 0.01, 0.0025);
+  judge(config, from, to, &result);
   return result;
 }
 

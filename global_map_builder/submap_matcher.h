@@ -56,4 +56,8 @@ struct MatchResult {
 MatchResult match_submaps(const MatchConfig& config, const Submap& from, const Submap& to, const Pose2& T_from_to,
                           const MatchWindow& window);
 
+/// The same from a good guess, without a search: for places that follow each other along the drive. Finer than the
+/// mapper's estimate, because all readings count at once and nothing is sampled.
+MatchResult align_submaps(const MatchConfig& config, const Submap& from, const Submap& to, const Pose2& T_from_to);
+
 }  // namespace knav
