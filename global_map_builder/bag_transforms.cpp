@@ -4,7 +4,9 @@
 
 namespace knav {
 
-std::string without_leading_slash(const std::string& name) { return name.substr(!name.empty() && name[0] == '/'); }
+std::string without_leading_slash(const std::string& name) {
+  return name.substr(!name.empty() && name[0] == '/');
+}
 
 void FixedTransforms::add(const geometry_msgs::TransformStamped& transform) {
   if (link_of_child_.count(without_leading_slash(transform.child_frame_id)) == 0) replace(transform);
@@ -19,7 +21,8 @@ bool FixedTransforms::replace(const geometry_msgs::TransformStamped& transform) 
   T.linear() = rotation.normalized().toRotationMatrix();
   T.translation() = Eigen::Vector3d(t.x, t.y, t.z);
   if (!T.translation().allFinite()) return false;
-  link_of_child_[without_leading_slash(transform.child_frame_id)] = {without_leading_slash(transform.header.frame_id), T};
+  link_of_child_[without_leading_slash(transform.child_frame_id)] = {
+      without_leading_slash(transform.header.frame_id), T};
   return true;
 }
 

@@ -10,7 +10,8 @@
 
 namespace knav {
 
-/// The fixed transforms of a recording: the first value seen of every child frame. Names without a leading slash.
+/// The fixed transforms of a recording: the first value seen of every child frame. Names without a leading
+/// slash.
 class FixedTransforms {
  public:
   void add(const geometry_msgs::TransformStamped& transform);

@@ -20,7 +20,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-const char* const kFooter = R"(DIR receives map.yaml, map.pgm (map_server's format), distance.tiff (float32 m, signed, NaN unknown), keepout.pgm,
+const char* const kFooter =
+    R"(DIR receives map.yaml, map.pgm (map_server's format), distance.tiff (float32 m, signed, NaN unknown), keepout.pgm,
 places.yaml, trajectory.tum, graph.g2o, closures.json, map.png and metadata.yaml.
 The JSON of --json holds source, observations (count), frames_used, path_m, keyframes, marks, breaks (times the mapper
 lost the thread), mended_steps (its jumps, mended), closures {found, accepted, button, automatic}, graph {chi2, iterations}, map {width_m, height_m,
@@ -110,7 +111,8 @@ Read read_bags(const Options& options, const ObservationReaderConfig& config, co
     callbacks.mark = [&](double stamp_s) { builder->mark(stamp_s); };
     callbacks.progress = [&](double fraction) {
       const auto& poses = builder->drive().keyframes();
-      stages->update("trajectory", (static_cast<double>(i) + fraction) / static_cast<double>(options.bags.size()),
+      stages->update("trajectory",
+                     (static_cast<double>(i) + fraction) / static_cast<double>(options.bags.size()),
                      fmt::format("{} frames, {:.0f} m", builder->drive().trajectory().size(),
                                  poses.empty() ? 0.0 : poses.back().path_m));
     };
@@ -121,10 +123,12 @@ Read read_bags(const Options& options, const ObservationReaderConfig& config, co
     if (statistics.observations == 0) {
       throw UserError(fmt::format("{}: holds no usable observation; nothing was built.", options.bags[i]));
     }
-    if (statistics.odometry == 0) throw UserError(options.bags[i] + ": its odometry holds no usable message.");
+    if (statistics.odometry == 0)
+      throw UserError(options.bags[i] + ": its odometry holds no usable message.");
     if (read.observations > 0 && statistics.first_stamp_s < read.last_s) {
-      throw UserError(fmt::format("{}: begins before {} ends; several bags must be parts of one drive, in order.",
-                                  options.bags[i], options.bags[i - 1]));
+      throw UserError(
+          fmt::format("{}: begins before {} ends; several bags must be parts of one drive, in order.",
+                      options.bags[i], options.bags[i - 1]));
     }
     if (read.observations == 0) read.first_s = statistics.first_stamp_s;
     read.last_s = statistics.last_stamp_s;
@@ -178,57 +182,68 @@ void build_map(const Options& options) {
 
   const GridGeometry& g = built.map.occupancy.geometry;
   const double total_s = seconds_since(start);
-  const Json json = {
-      {"source", read.source},
-      {"observations", read.observations},
-      {"frames_used", drive.frames().size()},
-      {"path_m", drive.keyframes().back().path_m},
-      {"keyframes", drive.keyframes().size()},
-      {"marks", read.marks},
-      {"breaks", drive.breaks()},
-      {"mended_steps", built.mended_steps},
-      {"closures",
-       {{"found", built.closures.size()}, {"accepted", accepted}, {"button", by_button}, {"automatic", accepted - by_button}}},
-      {"graph", {{"chi2", chi2(built.graph)}, {"edges", built.graph.edges.size()}}},
-      {"map",
-       {{"width_m", g.width_cells * g.resolution_m},
-        {"height_m", g.height_cells * g.resolution_m},
-        {"contour_m", contour_m},
-        {"checksum", built.map.checksum}}},
-      {"time_s",
-       {{"read", read_s},
-        {"refinement", built.stage_s["refinement"]},
-        {"closures", built.stage_s["closures"]},
-        {"surface", built.stage_s["surface"]},
-        {"distance", built.stage_s["distance"]},
-        {"total", total_s}}},
-      {"recording_s", read.last_s - read.first_s},
-      {"memory_mb", peak_memory_mb()},
-      {"seed", mapper.seed}};
+  const Json json = {{"source", read.source},
+                     {"observations", read.observations},
+                     {"frames_used", drive.frames().size()},
+                     {"path_m", drive.keyframes().back().path_m},
+                     {"keyframes", drive.keyframes().size()},
+                     {"marks", read.marks},
+                     {"breaks", drive.breaks()},
+                     {"mended_steps", built.mended_steps},
+                     {"closures",
+                      {{"found", built.closures.size()},
+                       {"accepted", accepted},
+                       {"button", by_button},
+                       {"automatic", accepted - by_button}}},
+                     {"graph", {{"chi2", chi2(built.graph)}, {"edges", built.graph.edges.size()}}},
+                     {"map",
+                      {{"width_m", g.width_cells * g.resolution_m},
+                       {"height_m", g.height_cells * g.resolution_m},
+                       {"contour_m", contour_m},
+                       {"checksum", built.map.checksum}}},
+                     {"time_s",
+                      {{"read", read_s},
+                       {"refinement", built.stage_s["refinement"]},
+                       {"closures", built.stage_s["closures"]},
+                       {"surface", built.stage_s["surface"]},
+                       {"distance", built.stage_s["distance"]},
+                       {"total", total_s}}},
+                     {"recording_s", read.last_s - read.first_s},
+                     {"memory_mb", peak_memory_mb()},
+                     {"seed", mapper.seed}};
   write_json(options.json, json.dump(2));
   if (drive.breaks() > 0) {
-    fmt::print(stderr, "build_map: the local mapper lost the thread {} times; the map hangs on odometry there.\n", drive.breaks());
+    fmt::print(stderr,
+               "build_map: the local mapper lost the thread {} times; the map hangs on odometry there.\n",
+               drive.breaks());
   }
-  fmt::print(stderr, "{}: {:.1f} x {:.1f} m, {:.0f} m driven, {} of {} closures, {:.0f} s of recording in {:.1f} s\n",
+  fmt::print(stderr,
+             "{}: {:.1f} x {:.1f} m, {:.0f} m driven, {} of {} closures, {:.0f} s of recording in {:.1f} s\n",
              options.out, g.width_cells * g.resolution_m, g.height_cells * g.resolution_m,
-             drive.keyframes().back().path_m, accepted, built.closures.size(), read.last_s - read.first_s, total_s);
+             drive.keyframes().back().path_m, accepted, built.closures.size(), read.last_s - read.first_s,
+             total_s);
 }
 
 }  // namespace
 }  // namespace knav
 
 int main(int argc, char** argv) {
-  CLI::App app("Builds a map directory from a recorded drive: depth profiles, a LaserScan or depth images, with odometry,\n"
-               "TF and button marks. The same bag, configuration and seed give the same map.");
+  CLI::App app(
+      "Builds a map directory from a recorded drive: depth profiles, a LaserScan or depth images, with "
+      "odometry,\n"
+      "TF and button marks. The same bag, configuration and seed give the same map.");
   knav::Options options;
   app.add_option("BAG", options.bags, "recording; several are the parts of one drive, in order")->required();
-  app.add_option("--out", options.out, "map directory to write; an older map there is replaced as a whole")->required();
-  app.add_option("--config", options.config, "configuration file, as config/default.yaml (sections map_builder, local_mapper)");
+  app.add_option("--out", options.out, "map directory to write; an older map there is replaced as a whole")
+      ->required();
+  app.add_option("--config", options.config,
+                 "configuration file, as config/default.yaml (sections map_builder, local_mapper)");
   app.add_option("--from", options.from, "what to build from; auto takes what the bag has")
       ->check(CLI::IsMember({"auto", "depth", "profile", "scan"}));
   app.add_option("--seed", options.seed, "overrides local_mapper/seed")->check(CLI::NonNegativeNumber);
   app.add_option("--json", options.json, "write the figures to this file; '-' for standard output");
-  app.add_flag("--force", options.force, "replace a map even if its keepout.pgm or places.yaml were edited by hand");
+  app.add_flag("--force", options.force,
+               "replace a map even if its keepout.pgm or places.yaml were edited by hand");
   app.footer(knav::kFooter);
   return knav::run_command(app, argc, argv, [&] { knav::build_map(options); });
 }

@@ -1,7 +1,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/Sparse>
-#include <complex>
 #include <algorithm>
+#include <complex>
 #include <unordered_map>
 
 #include "core/error.h"
@@ -116,8 +116,8 @@ std::vector<int> anchor_nodes(const PoseGraph& graph) {
   };
   for (const PoseGraphEdge& edge : graph.edges) {
     if (parent.count(edge.from) == 0 || parent.count(edge.to) == 0) {
-      throw UserError("pose graph: an edge joins " + std::to_string(edge.from) + " and " + std::to_string(edge.to) +
-                      ", but not both are nodes.");
+      throw UserError("pose graph: an edge joins " + std::to_string(edge.from) + " and " +
+                      std::to_string(edge.to) + ", but not both are nodes.");
     }
     const int a = root(edge.from), b = root(edge.to);
     parent[std::max(a, b)] = std::min(a, b);

@@ -38,7 +38,8 @@ std::vector<TsdfObservation> observations_near(const DriveRecorder& drive, int k
   const Pose2* taken = nullptr;
   for (; frame != frames.end() && frame->stamp_s < end_s && observations.size() < kSubmapFrames; ++frame) {
     if (taken != nullptr && distance_m(*taken, frame->T_drive_base) < kSubmapFrameDistance_m &&
-        std::fabs(normalize_angle_rad(taken->yaw_rad - frame->T_drive_base.yaw_rad)) < kSubmapFrameAngle_rad) {
+        std::fabs(normalize_angle_rad(taken->yaw_rad - frame->T_drive_base.yaw_rad)) <
+            kSubmapFrameAngle_rad) {
       continue;
     }
     taken = &frame->T_drive_base;
@@ -64,13 +65,14 @@ const Submap& ClosureFinder::submap(int keyframe) {
     surface.range_max_m = std::min(surface.range_max_m, config_.closures.submap_range_max_m);
     surface.min_looks = 2;
     entry = std::make_unique<Submap>(
-        surface, observations_near(drive_, keyframe, config_.closures.submap_half_length_m, surface.limits()));
+        surface,
+        observations_near(drive_, keyframe, config_.closures.submap_half_length_m, surface.limits()));
   }
   return *entry;
 }
 
-/// The shortest way between two keyframes along the drive and over the closures accepted so far: what error can have
-/// gathered between them.
+/// The shortest way between two keyframes along the drive and over the closures accepted so far: what error
+/// can have gathered between them.
 double ClosureFinder::drift_path_m(int from, int to) const {
   const auto& keyframes = drive_.keyframes();
   std::vector<std::vector<int>> jumps(keyframes.size());
@@ -105,7 +107,8 @@ MatchWindow ClosureFinder::window_for(double path_m) const {
   MatchWindow window;
   window.radius_m = std::min(c.search_max_m, c.search_base_m + c.search_per_m * path_m);
   window.angle_rad =
-      std::min(c.search_angle_max_deg, c.search_angle_base_deg + c.search_angle_deg_per_m * path_m) * kPi / 180.0;
+      std::min(c.search_angle_max_deg, c.search_angle_base_deg + c.search_angle_deg_per_m * path_m) * kPi /
+      180.0;
   return window;
 }
 
@@ -134,7 +137,8 @@ std::vector<int> ClosureFinder::earlier_visits(int keyframe) const {
     }
     left_at_path = other_path;
     // A long pass in a small place is split, so that no visit hides behind another.
-    if (other_path - keyframes[static_cast<std::size_t>(nearest)].path_m > 2.0 * config_.closures.nearest_m) finish();
+    if (other_path - keyframes[static_cast<std::size_t>(nearest)].path_m > 2.0 * config_.closures.nearest_m)
+      finish();
   }
   finish();
   return visits;
@@ -142,14 +146,16 @@ std::vector<int> ClosureFinder::earlier_visits(int keyframe) const {
 
 bool ClosureFinder::tried(int from, int to, const Pose2& prior) const {
   const auto attempt = attempts_.find({from, to});
-  return attempt != attempts_.end() && distance_m(attempt->second.prior, prior) < 0.5 * attempt->second.radius_m;
+  return attempt != attempts_.end() &&
+         distance_m(attempt->second.prior, prior) < 0.5 * attempt->second.radius_m;
 }
 
 bool ClosureFinder::add(Closure closure, const Pose2& prior) {
   const double path_m = drift_path_m(closure.from, closure.to);
   const MatchWindow window = window_for(path_m);
   attempts_[{closure.from, closure.to}] = {prior, window.radius_m};
-  closure.match = match_submaps(config_.closures.match, submap(closure.from), submap(closure.to), prior, window);
+  closure.match =
+      match_submaps(config_.closures.match, submap(closure.from), submap(closure.to), prior, window);
   closure.matched = closure.match.accepted;
   PoseGraphEdge edge{closure.from, closure.to, closure.match.T_from_to, closure.match.information, true};
   if (!closure.matched) {
@@ -179,7 +185,8 @@ bool ClosureFinder::join(Closure closure, const PoseGraphEdge& edge) {
   if (closure.accepted) {
     graph_ = std::move(trial);
   } else {
-    closure.reason = fmt::format("the drive would have to bend too much (chi2 grows by {:.0f})", closure.chi2);
+    closure.reason =
+        fmt::format("the drive would have to bend too much (chi2 grows by {:.0f})", closure.chi2);
   }
   closures_.push_back(std::move(closure));
   return closures_.back().accepted;
@@ -217,7 +224,8 @@ void ClosureFinder::search_from(int keyframe) {
   for (const int visit : earlier_visits(keyframe)) {
     const Pose2 prior = graph_.nodes.at(visit).inverse() * graph_.nodes.at(keyframe);
     const double radius_m = window_for(drift_path_m(visit, keyframe)).radius_m;
-    if (distance_m(prior, {}) > config_.closures.nearest_m + radius_m || tried(visit, keyframe, prior)) continue;
+    if (distance_m(prior, {}) > config_.closures.nearest_m + radius_m || tried(visit, keyframe, prior))
+      continue;
     const bool there = std::any_of(closures_.begin(), closures_.end(),
                                    [&](const Closure& c) { return c.from == visit && c.to == keyframe; });
     if (there) continue;
@@ -233,7 +241,8 @@ void ClosureFinder::optimize_all() { summary_ = optimize(config_.graph, &graph_)
 
 /// Closures that the graph as a whole contradicts are taken out, the worst first.
 void ClosureFinder::settle() {
-  const bool any = std::any_of(closures_.begin(), closures_.end(), [](const Closure& c) { return c.accepted; });
+  const bool any =
+      std::any_of(closures_.begin(), closures_.end(), [](const Closure& c) { return c.accepted; });
   if (!any) return;
   optimize_all();
   const double limit = 4.0 * config_.graph.robust_scale * config_.graph.robust_scale;
@@ -262,8 +271,9 @@ void ClosureFinder::settle() {
   }
   for (Closure& closure : closures_) {
     if (!closure.accepted) continue;
-    closure.chi2 = edge_chi2({closure.from, closure.to, closure.match.T_from_to, closure.match.information, true},
-                             graph_.nodes.at(closure.from), graph_.nodes.at(closure.to));
+    closure.chi2 =
+        edge_chi2({closure.from, closure.to, closure.match.T_from_to, closure.match.information, true},
+                  graph_.nodes.at(closure.from), graph_.nodes.at(closure.to));
   }
 }
 

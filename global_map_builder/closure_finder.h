@@ -13,17 +13,17 @@ namespace knav {
 
 /// Two visits of one place, and what was made of them.
 struct Closure {
-  int from = 0, to = 0;           ///< keyframes, from < to
-  std::string source;             ///< "button" or "automatic"
-  bool matched = false;           ///< by the local maps; otherwise the button's word alone
-  bool accepted = false;          ///< used by the map
-  std::string reason;             ///< why not
+  int from = 0, to = 0;   ///< keyframes, from < to
+  std::string source;     ///< "button" or "automatic"
+  bool matched = false;   ///< by the local maps; otherwise the button's word alone
+  bool accepted = false;  ///< used by the map
+  std::string reason;     ///< why not
   MatchResult match;
-  double chi2 = 0.0;              ///< of its edge in the final graph
+  double chi2 = 0.0;  ///< of its edge in the final graph
 };
 
-/// Finds the closures of a drive and keeps the pose graph that they give. Works along the drive: every closure found
-/// moves the graph, so that the next is sought from a better estimate.
+/// Finds the closures of a drive and keeps the pose graph that they give. Works along the drive: every
+/// closure found moves the graph, so that the next is sought from a better estimate.
 class ClosureFinder {
  public:
   ClosureFinder(const MapBuilderConfig& config, const DriveRecorder& drive);

@@ -45,10 +45,10 @@ double border(const Site& p, const Site& q, double row) {
   return 0.5 * ((q.x * q.x + hq * hq) - (p.x * p.x + hp * hp)) / (q.x - p.x);
 }
 
-/// Keeps of `sites` (sorted by x) those that own a part of the row between x = low and high; `from[i]` is where the
-/// part of the i-th begins.
-void keep_owners(const std::vector<Site>& sites, double row, double low, double high, std::vector<Site>* owners,
-                 std::vector<double>* from) {
+/// Keeps of `sites` (sorted by x) those that own a part of the row between x = low and high; `from[i]` is
+/// where the part of the i-th begins.
+void keep_owners(const std::vector<Site>& sites, double row, double low, double high,
+                 std::vector<Site>* owners, std::vector<double>* from) {
   owners->clear();
   from->clear();
   for (const Site& site : sites) {
@@ -89,10 +89,12 @@ void sweep(const GridGeometry& g, const Contour& contour, bool upward, std::vect
     candidates.clear();
     const auto by_x = [](const Site& p, const Site& q) { return p.x < q.x; };
     // Rows below the grid feed the first row; their sites are sorted by x row by row only.
-    std::vector<Site> fresh(sites.begin() + static_cast<std::ptrdiff_t>(next), sites.begin() + static_cast<std::ptrdiff_t>(end));
+    std::vector<Site> fresh(sites.begin() + static_cast<std::ptrdiff_t>(next),
+                            sites.begin() + static_cast<std::ptrdiff_t>(end));
     if (row == 0) std::stable_sort(fresh.begin(), fresh.end(), by_x);
     next = end;
-    std::merge(owners.begin(), owners.end(), fresh.begin(), fresh.end(), std::back_inserter(candidates), by_x);
+    std::merge(owners.begin(), owners.end(), fresh.begin(), fresh.end(), std::back_inserter(candidates),
+               by_x);
     keep_owners(candidates, row, low, high, &owners, &from);
     if (owners.empty()) continue;
     const int iy = upward ? row : g.height_cells - 1 - row;
@@ -117,7 +119,8 @@ void sweep(const GridGeometry& g, const Contour& contour, bool upward, std::vect
 
 std::vector<float> contour_distance_m(const GridGeometry& geometry, const Contour& contour) {
   std::vector<float> up, down;
-  tbb::parallel_invoke([&] { sweep(geometry, contour, true, &up); }, [&] { sweep(geometry, contour, false, &down); });
+  tbb::parallel_invoke([&] { sweep(geometry, contour, true, &up); },
+                       [&] { sweep(geometry, contour, false, &down); });
   for (std::size_t i = 0; i < up.size(); ++i) up[i] = std::sqrt(std::min(up[i], down[i]));
   return up;
 }
@@ -130,7 +133,8 @@ std::vector<float> ray_traced_distance_m(const GridGeometry& g, const std::vecto
     if (ix < 0 || iy < 0 || ix + 1 >= g.width_cells || iy + 1 >= g.height_cells) return std::nan("");
     const double tx = x - ix, ty = y - iy;
     const float* v = &value_m[g.index(ix, iy)];
-    return (1 - ty) * ((1 - tx) * v[0] + tx * v[1]) + ty * ((1 - tx) * v[g.width_cells] + tx * v[g.width_cells + 1]);
+    return (1 - ty) * ((1 - tx) * v[0] + tx * v[1]) +
+           ty * ((1 - tx) * v[g.width_cells] + tx * v[g.width_cells + 1]);
   };
   constexpr double kStep = 0.25;  // cells; no cell on the ray is skipped
   for (int iy = 0; iy < g.height_cells; ++iy) {

@@ -7,8 +7,8 @@
 
 namespace knav {
 
-/// Carries the graph's correction of the keyframes to any pose of the drive: hung on the keyframe before and on the
-/// one after, blended by time, so that nothing jumps at a keyframe.
+/// Carries the graph's correction of the keyframes to any pose of the drive: hung on the keyframe before and
+/// on the one after, blended by time, so that nothing jumps at a keyframe.
 class CorrectedDrive {
  public:
   CorrectedDrive(const std::vector<Keyframe>& keyframes, const std::vector<Pose2>& T_map_keyframe) {

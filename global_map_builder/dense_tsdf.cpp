@@ -9,7 +9,8 @@
 namespace knav {
 namespace {
 
-/// The part of the row at height dy over the sensor that the observation can touch, as offsets from the sensor.
+/// The part of the row at height dy over the sensor that the observation can touch, as offsets from the
+/// sensor.
 bool row_span(const TsdfObservation& o, float cos_yaw, float sin_yaw, double dy, double* low, double* high) {
   const double square = static_cast<double>(o.reach_m) * o.reach_m - dy * dy;
   if (square <= 0.0) return false;
@@ -37,8 +38,8 @@ constexpr int kChunk = 256;
 
 /// Which column of the observation sees each cell of a row, -1 for none, and the cells' squared distances.
 struct RowProjection {
-  float cos_yaw, sin_yaw;      ///< of the sensor
-  float first_dx, dy;          ///< of the first cell's centre from the sensor
+  float cos_yaw, sin_yaw;  ///< of the sensor
+  float first_dx, dy;      ///< of the first cell's centre from the sensor
   float resolution;
   float column_scale, column_shift, columns;
 };
@@ -62,7 +63,8 @@ inline float angle_of(float y, float x) {
   const float ax = std::fabs(x), ay = std::fabs(y);
   const float high = ax > ay ? ax : ay, low = ax > ay ? ay : ax;
   const float t = low / (high > 1e-12f ? high : 1e-12f), t2 = t * t;
-  float a = ((((-0.0117212f * t2 + 0.05265332f) * t2 - 0.11643287f) * t2 + 0.19354346f) * t2 - 0.33262347f) * t2;
+  float a =
+      ((((-0.0117212f * t2 + 0.05265332f) * t2 - 0.11643287f) * t2 + 0.19354346f) * t2 - 0.33262347f) * t2;
   a = (a + 0.99997726f) * t;
   a = ay > ax ? 1.57079632679f - a : a;
   a = x < 0.0f ? 3.14159265359f - a : a;
@@ -149,7 +151,8 @@ void DenseTsdf::add_row(const TsdfObservation& o, int iy, int from, int to) {
 void DenseTsdf::update(const TsdfObservation& o, std::size_t first, int count, const std::int32_t* column,
                        const float* square) {
   const auto front = static_cast<float>(config_.front_m);
-  const auto behind_base = static_cast<float>(config_.behind_m - config_.front_m);  // added to the column's mu
+  const auto behind_base =
+      static_cast<float>(config_.behind_m - config_.front_m);  // added to the column's mu
   const auto floor2 = static_cast<float>(config_.weight_range_floor_m * config_.weight_range_floor_m);
   const auto power = static_cast<float>(-config_.weight_power / 2.0);
   const bool fourth = config_.weight_power == 4.0, second = config_.weight_power == 2.0;

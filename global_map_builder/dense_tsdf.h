@@ -24,21 +24,23 @@ struct SurfaceConfig {
     v.number("resolution_m", resolution_m, 0.01, 0.5, "m", "Side of a cell of the map.");
     v.number("range_max_m", range_max_m, 1, 100, "m", "Readings farther than this do not enter the map.");
     v.number("front_m", front_m, 0.05, 5, "m", "Truncation before a surface.");
-    v.number("behind_m", behind_m, 0.02, 5, "m",
-             "Truncation behind a surface, at range 0: less than the thinnest wall that is seen from both sides.");
+    v.number(
+        "behind_m", behind_m, 0.02, 5, "m",
+        "Truncation behind a surface, at range 0: less than the thinnest wall that is seen from both sides.");
     v.number("per_range_squared", per_range_squared, 0, 0.1, "1/m", "Growth of both with the range squared.");
     v.number("weight_power", weight_power, 0, 8, "",
              "A reading weighs 1 / max(distance, floor)^this; 2 is the paper's, 4 is a Kinect's variance.");
-    v.number("weight_range_floor_m", weight_range_floor_m, 0.1, 10, "m", "The floor of the distance in that weight.");
+    v.number("weight_range_floor_m", weight_range_floor_m, 0.1, 10, "m",
+             "The floor of the distance in that weight.");
     v.integer("min_looks", min_looks, 1, 1000, "", "A cell seen less often stays unknown.");
   }
   std::vector<std::string> validate() const { return {}; }
   ObservationLimits limits() const;
 };
 
-/// The projective truncated signed distance (paper section III.D) over a whole building, in metres, without the
-/// local mapper's window: observations only enter. Two differences to it, both for walls seen from both sides: the
-/// support behind a surface is short, and near observations outweigh far ones by their variance.
+/// The projective truncated signed distance (paper section III.D) over a whole building, in metres, without
+/// the local mapper's window: observations only enter. Two differences to it, both for walls seen from both
+/// sides: the support behind a surface is short, and near observations outweigh far ones by their variance.
 class DenseTsdf {
  public:
   DenseTsdf(const GridGeometry& geometry, const SurfaceConfig& config);

@@ -32,9 +32,11 @@ void replace_directory(const std::string& directory, const std::function<void(co
   if (!target.has_filename()) target = target.parent_path();  // "maps/office/"
   std::error_code failed;
   fs::create_directories(target.parent_path(), failed);
-  const Cleanup beside{target.parent_path() / fmt::format(".{}.{}.part", target.filename().string(), getpid())};
+  const Cleanup beside{target.parent_path() /
+                       fmt::format(".{}.{}.part", target.filename().string(), getpid())};
   if (failed || !fs::create_directory(beside.path, failed)) {
-    throw UserError(fmt::format("{}: cannot create a directory there ({}).", target.string(), failed.message()));
+    throw UserError(
+        fmt::format("{}: cannot create a directory there ({}).", target.string(), failed.message()));
   }
   try {
     write(beside.path.string());

@@ -32,8 +32,8 @@ struct Keyframe {
   bool marked = false;       ///< the button was pressed here
 };
 
-/// Runs the local mapper along a recording and keeps what the map is made of. Poses are in the frame `drive`: the
-/// mapper's, carried over its epochs by odometry, with the first pose as origin.
+/// Runs the local mapper along a recording and keeps what the map is made of. Poses are in the frame `drive`:
+/// the mapper's, carried over its epochs by odometry, with the first pose as origin.
 class DriveRecorder {
  public:
   DriveRecorder(const DriveConfig& config, const LocalMapperConfig& mapper);
@@ -47,13 +47,14 @@ class DriveRecorder {
   /// Moves the keyframes, and with them frames and trajectory; edges become the steps between the new poses.
   /// @param T_drive_keyframe one per keyframe
   /// @param step_covariance added to each edge's own; one per edge
-  void adjust(const std::vector<Pose2>& T_drive_keyframe, const std::vector<Eigen::Matrix3d>& step_covariance);
+  void adjust(const std::vector<Pose2>& T_drive_keyframe,
+              const std::vector<Eigen::Matrix3d>& step_covariance);
 
   const std::vector<DriveFrame>& frames() const { return frames_; }
   const std::vector<Keyframe>& keyframes() const { return keyframes_; }
-  const Trajectory& trajectory() const { return trajectory_; }          ///< T_drive_base of every accepted frame
-  const Trajectory& odometry() const { return odometry_; }              ///< T_odom_base at the same stamps
-  const std::vector<PoseGraphEdge>& edges() const { return edges_; }    ///< from each keyframe to the next
+  const Trajectory& trajectory() const { return trajectory_; }  ///< T_drive_base of every accepted frame
+  const Trajectory& odometry() const { return odometry_; }      ///< T_odom_base at the same stamps
+  const std::vector<PoseGraphEdge>& edges() const { return edges_; }  ///< from each keyframe to the next
   std::size_t refused() const { return refused_; }
   const std::string& last_refusal() const { return last_refusal_; }
   int breaks() const { return breaks_; }

@@ -23,7 +23,8 @@ MatchConfig match_config() {
 }  // namespace
 
 std::vector<PoseGraphEdge> refine_drive(const RefinementConfig& config, const SurfaceConfig& surface,
-                                        const DriveRecorder& drive, const std::function<void(double)>& progress) {
+                                        const DriveRecorder& drive,
+                                        const std::function<void(double)>& progress) {
   std::vector<PoseGraphEdge> edges;
   if (!config.enabled) return edges;
   SurfaceConfig near = surface;
@@ -31,11 +32,13 @@ std::vector<PoseGraphEdge> refine_drive(const RefinementConfig& config, const Su
   near.min_looks = 2;
   const std::vector<Keyframe>& keyframes = drive.keyframes();
   const MatchConfig match = match_config();
-  const double heading_sd = config.heading_sd_deg * kPi / 180.0, position2 = config.position_sd_m * config.position_sd_m;
+  const double heading_sd = config.heading_sd_deg * kPi / 180.0,
+               position2 = config.position_sd_m * config.position_sd_m;
   const Eigen::Matrix3d floor = Eigen::Vector3d(position2, position2, heading_sd * heading_sd).asDiagonal();
   const int spans = static_cast<int>(config.spans_m.size());
   std::vector<std::unique_ptr<Submap>> submaps(keyframes.size());
-  constexpr std::size_t kBatch = 64;  // keyframes between two reports; submaps behind the longest span are let go
+  constexpr std::size_t kBatch =
+      64;  // keyframes between two reports; submaps behind the longest span are let go
   for (std::size_t first = 0; first < keyframes.size(); first += kBatch) {
     progress(static_cast<double>(first) / static_cast<double>(keyframes.size()));
     const std::size_t last = std::min(keyframes.size(), first + kBatch);
@@ -56,7 +59,8 @@ std::vector<PoseGraphEdge> refine_drive(const RefinementConfig& config, const Su
         const MatchResult result = align_submaps(match, *submaps[from], *submaps[to], T_from_to);
         // A large step from the mapper's estimate is a slip along something, not its noise.
         if (!result.accepted || distance_m(result.T_from_to, T_from_to) > config.max_change_m) continue;
-        PoseGraphEdge& edge = found[(to - first) * static_cast<std::size_t>(spans) + static_cast<std::size_t>(span)];
+        PoseGraphEdge& edge =
+            found[(to - first) * static_cast<std::size_t>(spans) + static_cast<std::size_t>(span)];
         edge.from = static_cast<int>(from);
         edge.to = static_cast<int>(to);
         edge.T_from_to = result.T_from_to;
@@ -67,7 +71,8 @@ std::vector<PoseGraphEdge> refine_drive(const RefinementConfig& config, const Su
     for (const PoseGraphEdge& edge : found) {
       if (edge.to != edge.from) edges.push_back(edge);
     }
-    const double longest_m = config.spans_m.empty() ? 0.0 : *std::max_element(config.spans_m.begin(), config.spans_m.end());
+    const double longest_m =
+        config.spans_m.empty() ? 0.0 : *std::max_element(config.spans_m.begin(), config.spans_m.end());
     for (std::size_t i = 0; i < last; ++i) {
       if (keyframes[i].path_m < keyframes[last - 1].path_m - longest_m - 2.0) submaps[i].reset();
     }

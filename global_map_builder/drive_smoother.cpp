@@ -9,14 +9,15 @@
 namespace knav {
 namespace {
 
-constexpr std::size_t kMinSteps = 20;      // fewer say nothing about what is usual
-constexpr double kStepPosition_sd_m = 0.004, kStepHeading_sd_rad = 0.0015;  // the mapper's, when it does not jump
+constexpr std::size_t kMinSteps = 20;  // fewer say nothing about what is usual
+constexpr double kStepPosition_sd_m = 0.004,
+                 kStepHeading_sd_rad = 0.0015;  // the mapper's, when it does not jump
 
 /// Of one step: how far the mapper's end lies from odometry's.
 struct Deviation {
-  Eigen::Vector3d apart;    ///< (x [m], y [m], yaw [rad])
-  Eigen::Vector2d motion;   ///< odometry's (length [m], turn [rad])
-  double units;             ///< size of the step, about 1 for half a metre or half a radian
+  Eigen::Vector3d apart;   ///< (x [m], y [m], yaw [rad])
+  Eigen::Vector2d motion;  ///< odometry's (length [m], turn [rad])
+  double units;            ///< size of the step, about 1 for half a metre or half a radian
 };
 
 double median(std::vector<double> values) {
@@ -40,8 +41,8 @@ std::vector<Deviation> deviations_of(const DriveRecorder& drive) {
   return deviations;
 }
 
-/// What odometry usually does wrong: in proportion to length and turn (a wheel's diameter, the wheels' distance),
-/// and the spread that remains.
+/// What odometry usually does wrong: in proportion to length and turn (a wheel's diameter, the wheels'
+/// distance), and the spread that remains.
 struct Usual {
   Eigen::Matrix<double, 3, 2> gain;
   Eigen::Vector3d sd;  ///< per unit
@@ -56,7 +57,8 @@ Usual usual_of(const std::vector<Deviation>& deviations) {
     double sd = 0.0;
     for (int iteration = 0; iteration < 10; ++iteration) {
       std::vector<double> sizes;
-      for (const Deviation& d : deviations) sizes.push_back(std::fabs(d.apart(c) - gain.dot(d.motion)) / d.units);
+      for (const Deviation& d : deviations)
+        sizes.push_back(std::fabs(d.apart(c) - gain.dot(d.motion)) / d.units);
       sd = std::max(1.4826 * median(sizes), floor(c));
       // Least squares, outliers weighed down (Cauchy), drawn a little towards no error at all.
       Eigen::Matrix2d normal = 1e-3 * Eigen::Matrix2d::Identity();
@@ -83,8 +85,9 @@ Eigen::Vector3d step_sd() { return {kStepPosition_sd_m, kStepPosition_sd_m, kSte
 
 }  // namespace
 
-int smooth_drive(const RefinementConfig& config, const GraphOptimizerConfig& graph_config, const SurfaceConfig& surface,
-                 DriveRecorder* drive, const std::function<void(double)>& progress) {
+int smooth_drive(const RefinementConfig& config, const GraphOptimizerConfig& graph_config,
+                 const SurfaceConfig& surface, DriveRecorder* drive,
+                 const std::function<void(double)>& progress) {
   const std::vector<PoseGraphEdge> steps = drive->edges();
   if (!config.enabled || steps.size() < kMinSteps) return 0;
   const std::vector<Deviation> deviations = deviations_of(*drive);
@@ -96,7 +99,8 @@ int smooth_drive(const RefinementConfig& config, const GraphOptimizerConfig& gra
   }
   std::vector<bool> jump(steps.size());
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    // A jump is decided here rather than by a robust loss: starting from the mapper's poses that would keep them.
+    // A jump is decided here rather than by a robust loss: starting from the mapper's poses that would keep
+    // them.
     const Eigen::Vector3d excess = (deviations[i].apart - usual.bias(deviations[i])) / deviations[i].units;
     jump[i] = excess.cwiseQuotient(usual.sd).squaredNorm() > config.jump_chi2;
     if (!jump[i]) {

@@ -1,8 +1,8 @@
 #include "global_map_builder/graph_optimizer.h"
 
 #include <ceres/ceres.h>
-#include <Eigen/Cholesky>
 
+#include <Eigen/Cholesky>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -11,7 +11,8 @@
 namespace knav {
 namespace {
 
-/// Dynamic covariance scaling (Agarwal et al., ICRA 2013) as a loss: quadratic to phi, then levelling off at 3 phi.
+/// Dynamic covariance scaling (Agarwal et al., ICRA 2013) as a loss: quadratic to phi, then levelling off at
+/// 3 phi.
 class DcsLoss final : public ceres::LossFunction {
  public:
   explicit DcsLoss(double phi) : phi_(phi) {}
@@ -79,7 +80,8 @@ Outcome solve(const GraphOptimizerConfig& config, PoseGraph* graph) {
   for (const auto& [id, pose] : graph->nodes) values[id] = {pose.x_m, pose.y_m, pose.yaw_rad};
 
   std::unique_ptr<ceres::LossFunction> loss;
-  if (config.robust_loss == "dcs") loss = std::make_unique<DcsLoss>(config.robust_scale * config.robust_scale);
+  if (config.robust_loss == "dcs")
+    loss = std::make_unique<DcsLoss>(config.robust_scale * config.robust_scale);
   if (config.robust_loss == "cauchy") loss = std::make_unique<ceres::CauchyLoss>(config.robust_scale);
 
   ceres::Problem::Options ownership;
@@ -87,8 +89,8 @@ Outcome solve(const GraphOptimizerConfig& config, PoseGraph* graph) {
   ceres::Problem problem(ownership);
   for (auto& [id, value] : values) problem.AddParameterBlock(value.data(), 3);
   for (const PoseGraphEdge& edge : graph->edges) {
-    problem.AddResidualBlock(new EdgeCost(edge), edge.robust ? loss.get() : nullptr, values.at(edge.from).data(),
-                             values.at(edge.to).data());
+    problem.AddResidualBlock(new EdgeCost(edge), edge.robust ? loss.get() : nullptr,
+                             values.at(edge.from).data(), values.at(edge.to).data());
   }
   for (const int anchor : anchor_nodes(*graph)) problem.SetParameterBlockConstant(values.at(anchor).data());
 

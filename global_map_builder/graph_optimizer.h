@@ -16,11 +16,13 @@ struct GraphOptimizerConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v.choice("initialization", initialization, {"given", "chordal", "best"},
-             "Start from the poses given, from rotations and then positions solved linearly (chordal relaxation), or "
+             "Start from the poses given, from rotations and then positions solved linearly (chordal "
+             "relaxation), or "
              "from both, keeping the better end.");
     v.choice("robust_loss", robust_loss, {"none", "cauchy", "dcs"},
              "Loss on closures: dcs (dynamic covariance scaling) lets a wrong one fade out.");
-    v.number("robust_scale", robust_scale, 0.1, 100, "sigma", "Errors beyond this many standard deviations fade.");
+    v.number("robust_scale", robust_scale, 0.1, 100, "sigma",
+             "Errors beyond this many standard deviations fade.");
     v.integer("max_iterations", max_iterations, 1, 10000, "", "Of the optimiser.");
   }
   std::vector<std::string> validate() const { return {}; }
@@ -32,16 +34,17 @@ struct GraphOptimizerSummary {
   double robust_cost = 0.0;   ///< with it, without a factor 1/2
   int iterations = 0;
   double time_s = 0.0;
-  std::string initialization; ///< that the result came from
+  std::string initialization;  ///< that the result came from
 };
 
-/// Moves the nodes to where sum e' information e is least (Ceres, Levenberg-Marquardt on SE(2)). The lowest node of
-/// every connected part stays where it is. UserError if an edge names a missing node.
+/// Moves the nodes to where sum e' information e is least (Ceres, Levenberg-Marquardt on SE(2)). The lowest
+/// node of every connected part stays where it is. UserError if an edge names a missing node.
 GraphOptimizerSummary optimize(const GraphOptimizerConfig& config, PoseGraph* graph);
 
-/// Rotations first: the chordal relaxation of all headings (one sparse linear solve over unit complex numbers), then
-/// all positions by a second linear solve given those headings (Carlone et al., "Initialization Techniques for 3D
-/// SLAM", ICRA 2015). Independent of the poses given but for the lowest node of every connected part.
+/// Rotations first: the chordal relaxation of all headings (one sparse linear solve over unit complex
+/// numbers), then all positions by a second linear solve given those headings (Carlone et al.,
+/// "Initialization Techniques for 3D SLAM", ICRA 2015). Independent of the poses given but for the lowest
+/// node of every connected part.
 void initialize_chordal(PoseGraph* graph);
 
 /// The lowest node number of every connected part.

@@ -23,8 +23,9 @@ using Report = std::function<void(const char*, double)>;
 constexpr std::size_t kBatch = 128;  // frames prepared at once, to bound memory
 constexpr int kBand_rows = 64;
 
-std::vector<TsdfObservation> prepare(const std::vector<DriveFrame>& frames, std::size_t first, std::size_t last,
-                                     const CorrectedDrive& corrected, const ObservationLimits& limits) {
+std::vector<TsdfObservation> prepare(const std::vector<DriveFrame>& frames, std::size_t first,
+                                     std::size_t last, const CorrectedDrive& corrected,
+                                     const ObservationLimits& limits) {
   std::vector<TsdfObservation> out(last - first);
   tbb::parallel_for(first, last, [&](std::size_t i) {
     TsdfObservation& o = out[i - first];
@@ -42,32 +43,36 @@ GridGeometry enclosing(const GridGeometry& a, const GridGeometry& b) {
   const int low_x = std::min(cells(a.origin_x_m), cells(b.origin_x_m));
   const int low_y = std::min(cells(a.origin_y_m), cells(b.origin_y_m));
   g.width_cells = std::max(cells(a.origin_x_m) + a.width_cells, cells(b.origin_x_m) + b.width_cells) - low_x;
-  g.height_cells = std::max(cells(a.origin_y_m) + a.height_cells, cells(b.origin_y_m) + b.height_cells) - low_y;
+  g.height_cells =
+      std::max(cells(a.origin_y_m) + a.height_cells, cells(b.origin_y_m) + b.height_cells) - low_y;
   g.origin_x_m = low_x * a.resolution_m;
   g.origin_y_m = low_y * a.resolution_m;
   return g;
 }
 
-GridGeometry extent(const MapBuilderConfig& config, const DriveRecorder& drive, const CorrectedDrive& corrected) {
+GridGeometry extent(const MapBuilderConfig& config, const DriveRecorder& drive,
+                    const CorrectedDrive& corrected) {
   GridGeometry geometry;
   geometry.resolution_m = config.surface.resolution_m;
   const auto& frames = drive.frames();
   for (std::size_t first = 0; first < frames.size(); first += kBatch) {
     const std::size_t last = std::min(frames.size(), first + kBatch);
-    geometry = enclosing(geometry, geometry_for(config.surface.resolution_m,
-                                                prepare(frames, first, last, corrected, config.surface.limits())));
+    geometry =
+        enclosing(geometry, geometry_for(config.surface.resolution_m,
+                                         prepare(frames, first, last, corrected, config.surface.limits())));
   }
   const double width_m = geometry.width_cells * geometry.resolution_m;
   const double height_m = geometry.height_cells * geometry.resolution_m;
   if (std::max(width_m, height_m) > config.size_max_m) {
-    throw UserError(fmt::format("the map would be {:.0f} x {:.0f} m, more than size_max_m = {:.0f}; check the odometry.",
-                                width_m, height_m, config.size_max_m));
+    throw UserError(
+        fmt::format("the map would be {:.0f} x {:.0f} m, more than size_max_m = {:.0f}; check the odometry.",
+                    width_m, height_m, config.size_max_m));
   }
   return geometry;
 }
 
-DenseTsdf integrate(const MapBuilderConfig& config, const DriveRecorder& drive, const CorrectedDrive& corrected,
-                    const GridGeometry& geometry, const Report& report) {
+DenseTsdf integrate(const MapBuilderConfig& config, const DriveRecorder& drive,
+                    const CorrectedDrive& corrected, const GridGeometry& geometry, const Report& report) {
   DenseTsdf tsdf(geometry, config.surface);
   const auto& frames = drive.frames();
   const int bands = (geometry.height_cells + kBand_rows - 1) / kBand_rows;
@@ -75,7 +80,8 @@ DenseTsdf integrate(const MapBuilderConfig& config, const DriveRecorder& drive, 
     report("surface", static_cast<double>(first) / static_cast<double>(frames.size()));
     const std::size_t last = std::min(frames.size(), first + kBatch);
     const auto batch = prepare(frames, first, last, corrected, config.surface.limits());
-    // Every cell belongs to one band and takes the frames in their order: the same sums on any number of threads.
+    // Every cell belongs to one band and takes the frames in their order: the same sums on any number of
+    // threads.
     tbb::parallel_for(0, bands, [&](int band) {
       for (const TsdfObservation& o : batch) {
         tsdf.add(o, band * kBand_rows, std::min(geometry.height_cells, (band + 1) * kBand_rows));
@@ -103,7 +109,8 @@ Crop known_part(const GridGeometry& g, const std::vector<float>& value) {
   if (c.low_x >= c.high_x) throw UserError("nothing was seen within range; the map would be empty.");
   constexpr int kMargin_cells = 10;
   return {std::max(0, c.low_x - kMargin_cells), std::max(0, c.low_y - kMargin_cells),
-          std::min(g.width_cells, c.high_x + kMargin_cells), std::min(g.height_cells, c.high_y + kMargin_cells)};
+          std::min(g.width_cells, c.high_x + kMargin_cells),
+          std::min(g.height_cells, c.high_y + kMargin_cells)};
 }
 
 void crop(const Crop& c, GridGeometry* g, std::vector<float>* value) {
@@ -114,7 +121,8 @@ void crop(const Crop& c, GridGeometry* g, std::vector<float>* value) {
   out.origin_y_m = g->origin_y_m + c.low_y * g->resolution_m;
   std::vector<float> cut(out.cell_count());
   for (int iy = 0; iy < out.height_cells; ++iy) {
-    for (int ix = 0; ix < out.width_cells; ++ix) cut[out.index(ix, iy)] = (*value)[g->index(ix + c.low_x, iy + c.low_y)];
+    for (int ix = 0; ix < out.width_cells; ++ix)
+      cut[out.index(ix, iy)] = (*value)[g->index(ix + c.low_x, iy + c.low_y)];
   }
   *g = out;
   *value = std::move(cut);
@@ -141,7 +149,8 @@ std::vector<bool> driven_cells(const GridGeometry& g, const Trajectory& trajecto
     any = true;
     for (int iy = g.cell_y(T.y_m - radius_m); iy <= g.cell_y(T.y_m + radius_m); ++iy) {
       for (int ix = g.cell_x(T.x_m - radius_m); ix <= g.cell_x(T.x_m + radius_m); ++ix) {
-        if (g.contains(ix, iy) && std::hypot(g.center_x_m(ix) - T.x_m, g.center_y_m(iy) - T.y_m) <= radius_m) {
+        if (g.contains(ix, iy) &&
+            std::hypot(g.center_x_m(ix) - T.x_m, g.center_y_m(iy) - T.y_m) <= radius_m) {
           driven[g.index(ix, iy)] = true;
         }
       }

@@ -15,19 +15,19 @@
 namespace knav {
 
 struct BuiltMap {
-  MapDirectory map;                    ///< with the corrected trajectory; the start pose is the origin
+  MapDirectory map;  ///< with the corrected trajectory; the start pose is the origin
   Contour contour;
   PoseGraph graph;
   std::vector<Closure> closures;
-  std::vector<Pose2> keyframes;        ///< T_map_base, by the numbers that closures use
-  Trajectory drive, odometry;          ///< uncorrected, at the map trajectory's stamps, from the origin
-  int mended_steps = 0;                ///< where the mapper jumped
+  std::vector<Pose2> keyframes;  ///< T_map_base, by the numbers that closures use
+  Trajectory drive, odometry;    ///< uncorrected, at the map trajectory's stamps, from the origin
+  int mended_steps = 0;          ///< where the mapper jumped
   std::map<std::string, double> stage_s;
 };
 
-/// From a recording to a global map (paper section III.G): the local mapper's trajectory, closures, robust graph
-/// optimisation, one signed distance grid from the corrected trajectory, its contour and the true distance to it.
-/// Not thread safe. The same calls give the same bytes.
+/// From a recording to a global map (paper section III.G): the local mapper's trajectory, closures, robust
+/// graph optimisation, one signed distance grid from the corrected trajectory, its contour and the true
+/// distance to it. Not thread safe. The same calls give the same bytes.
 class MapBuilder {
  public:
   MapBuilder(const MapBuilderConfig& config, const LocalMapperConfig& mapper);

@@ -28,13 +28,17 @@ struct DriveConfig {
     v.number("frame_distance_m", frame_distance_m, 0, 10, "m", "A frame is kept after this distance ...");
     v.number("frame_angle_deg", frame_angle_deg, 0, 180, "deg", "... or this turn ...");
     v.number("frame_period_s", frame_period_s, 0, 3600, "s", "... or this time.");
-    v.number("keyframe_distance_m", keyframe_distance_m, 0.05, 10, "m", "A node of the graph after this distance ...");
+    v.number("keyframe_distance_m", keyframe_distance_m, 0.05, 10, "m",
+             "A node of the graph after this distance ...");
     v.number("keyframe_angle_deg", keyframe_angle_deg, 1, 180, "deg", "... or this turn.");
     v.number("position_sd_per_m", position_sd_per_m, 1e-4, 1, "m/m",
-             "Position error (sd) of the local mapper per distance, of one metre; grows as the root of the distance.");
-    v.number("position_sd_floor_m", position_sd_floor_m, 1e-4, 1, "m", "Position error (sd) of a step, at least.");
+             "Position error (sd) of the local mapper per distance, of one metre; grows as the root of the "
+             "distance.");
+    v.number("position_sd_floor_m", position_sd_floor_m, 1e-4, 1, "m",
+             "Position error (sd) of a step, at least.");
     v.number("heading_sd_deg_per_m", heading_sd_deg_per_m, 1e-3, 45, "deg/m", "Heading error, likewise.");
-    v.number("heading_sd_per_turn", heading_sd_per_turn, 0, 1, "rad/rad", "Heading error (sd) per angle turned.");
+    v.number("heading_sd_per_turn", heading_sd_per_turn, 0, 1, "rad/rad",
+             "Heading error (sd) per angle turned.");
     v.number("filter_share", filter_share, 0, 1, "",
              "Share of the mapper's own covariance that is added to a step's.");
     v.number("doubt_before_break_s", doubt_before_break_s, 0, 60, "s",
@@ -71,24 +75,31 @@ struct ClosureConfig {
              "A local map holds what was seen from this far before a keyframe to this far after it.");
     v.number("submap_spacing_m", submap_spacing_m, 0.2, 50, "m", "Local maps every so far along the path.");
     v.number("submap_range_max_m", submap_range_max_m, 1, 50, "m", "They hold readings up to this range.");
-    v.number("min_path_m", min_path_m, 1, 1000, "m", "Two visits lie at least this far apart along the path.");
+    v.number("min_path_m", min_path_m, 1, 1000, "m",
+             "Two visits lie at least this far apart along the path.");
     v.number("search_base_m", search_base_m, 0.1, 50, "m", "The search reaches this far ...");
-    v.number("search_per_m", search_per_m, 0, 1, "m/m", "... plus this per distance driven since the last common point ...");
+    v.number("search_per_m", search_per_m, 0, 1, "m/m",
+             "... plus this per distance driven since the last common point ...");
     v.number("search_max_m", search_max_m, 0.1, 50, "m", "... at most.");
     v.number("search_angle_base_deg", search_angle_base_deg, 0, 180, "deg", "Likewise for the heading.");
     v.number("search_angle_deg_per_m", search_angle_deg_per_m, 0, 10, "deg/m", "Likewise for the heading.");
     v.number("search_angle_max_deg", search_angle_max_deg, 0, 180, "deg", "Likewise for the heading.");
-    v.number("button_sd_m", button_sd_m, 0.01, 5, "m", "How well the robot is put back at a marked place (sd).");
-    v.number("nearest_m", nearest_m, 0.1, 50, "m", "Local maps farther apart than this (and the search) are not compared.");
+    v.number("button_sd_m", button_sd_m, 0.01, 5, "m",
+             "How well the robot is put back at a marked place (sd).");
+    v.number("nearest_m", nearest_m, 0.1, 50, "m",
+             "Local maps farther apart than this (and the search) are not compared.");
     v.number("max_innovation", max_innovation, 1, 1e6, "",
-             "A closure that makes the graph's chi2 grow by more is refused: the drive cannot have been so wrong.");
-    v.integer("passes", passes, 1, 5, "", "Passes over the drive; each starts from the graph that the last one left.");
+             "A closure that makes the graph's chi2 grow by more is refused: the drive cannot have been so "
+             "wrong.");
+    v.integer("passes", passes, 1, 5, "",
+              "Passes over the drive; each starts from the graph that the last one left.");
     v.group("match", match, "When a match counts.");
   }
   std::vector<std::string> validate() const { return {}; }
 };
 
-/// Finding and mending the mapper's jumps, with edges between keyframes a few metres apart by direct alignment.
+/// Finding and mending the mapper's jumps, with edges between keyframes a few metres apart by direct
+/// alignment.
 struct RefinementConfig {
   bool enabled = true;
   double half_length_m = 0.5;
@@ -103,20 +114,24 @@ struct RefinementConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v.flag("enabled", enabled, "Look for jumps of the mapper and mend them.");
-    v.number("half_length_m", half_length_m, 0.05, 10, "m", "What was seen this far before and after a keyframe.");
+    v.number("half_length_m", half_length_m, 0.05, 10, "m",
+             "What was seen this far before and after a keyframe.");
     v.number("range_max_m", range_max_m, 1, 50, "m", "Readings up to this range.");
     v.list("spans_m", spans_m, "m", "Distances along the drive between the keyframes that are aligned.");
-    v.number("max_change_m", max_change_m, 0.01, 5, "m", "An alignment farther from the mapper's estimate is ignored.");
+    v.number("max_change_m", max_change_m, 0.01, 5, "m",
+             "An alignment farther from the mapper's estimate is ignored.");
     v.number("position_sd_m", position_sd_m, 1e-3, 1, "m", "How well such an alignment is trusted (sd).");
     v.number("heading_sd_deg", heading_sd_deg, 0.01, 20, "deg", "How well its heading is trusted (sd).");
     v.number("odometry_sd_factor", odometry_sd_factor, 0.1, 100, "",
              "Odometry is trusted to this times its usual deviation from the mapper.");
     v.number("jump_chi2", jump_chi2, 1, 1e9, "",
-             "A step of the mapper that parts from odometry by more than this (squared, in usual deviations) is a jump.");
+             "A step of the mapper that parts from odometry by more than this (squared, in usual deviations) "
+             "is a jump.");
   }
   std::vector<std::string> validate() const {
     for (const double span : spans_m) {
-      if (!(span > 2.0 * half_length_m)) return {"refinement/spans_m must each exceed twice refinement/half_length_m."};
+      if (!(span > 2.0 * half_length_m))
+        return {"refinement/spans_m must each exceed twice refinement/half_length_m."};
     }
     return {};
   }
@@ -142,10 +157,12 @@ struct MapBuilderConfig {
     v.group("surface", surface, "The map's signed distance grid.");
     v.number("min_contour_piece_m", min_contour_piece_m, 0, 5, "m", "Shorter pieces of contour are noise.");
     v.number("robot_radius_m", robot_radius_m, 0, 2, "m",
-             "Ground that the robot's body, a disc, was on is free, though the Kinect sees none of it; 0 = it says nothing.");
+             "Ground that the robot's body, a disc, was on is free, though the Kinect sees none of it; 0 = "
+             "it says nothing.");
     v.choice("distance", distance, {"exact", "paper"},
              "exact: distance transform of the contour. paper: ray tracing from every cell (minutes).");
-    v.number("size_max_m", size_max_m, 5, 2000, "m", "A map larger than this in either direction is refused as an error.");
+    v.number("size_max_m", size_max_m, 5, 2000, "m",
+             "A map larger than this in either direction is refused as an error.");
   }
   std::vector<std::string> validate() const {
     std::vector<std::string> faults = refinement.validate();

@@ -8,20 +8,22 @@
 namespace knav {
 namespace {
 
-/// Sides of a square of four cell centres: 0 lower, 1 right, 2 upper, 3 left. For each sign pattern (bit per corner,
-/// set = positive; corners lower left, lower right, upper right, upper left) the sides a segment joins.
+/// Sides of a square of four cell centres: 0 lower, 1 right, 2 upper, 3 left. For each sign pattern (bit per
+/// corner, set = positive; corners lower left, lower right, upper right, upper left) the sides a segment
+/// joins.
 struct SidePair {
   int first, second;
 };
 constexpr SidePair kNone{-1, -1};
-constexpr SidePair kSides[16][2] = {
-    {kNone, kNone},  {{3, 0}, kNone}, {{0, 1}, kNone}, {{3, 1}, kNone}, {{1, 2}, kNone}, {kNone, kNone},
-    {{0, 2}, kNone}, {{3, 2}, kNone}, {{2, 3}, kNone}, {{2, 0}, kNone}, {kNone, kNone},  {{2, 1}, kNone},
-    {{1, 3}, kNone}, {{1, 0}, kNone}, {{0, 3}, kNone}, {kNone, kNone}};
+constexpr SidePair kSides[16][2] = {{kNone, kNone},  {{3, 0}, kNone}, {{0, 1}, kNone}, {{3, 1}, kNone},
+                                    {{1, 2}, kNone}, {kNone, kNone},  {{0, 2}, kNone}, {{3, 2}, kNone},
+                                    {{2, 3}, kNone}, {{2, 0}, kNone}, {kNone, kNone},  {{2, 1}, kNone},
+                                    {{1, 3}, kNone}, {{1, 0}, kNone}, {{0, 3}, kNone}, {kNone, kNone}};
 
 /// The two segments of a saddle, by the sign at its middle.
 void saddle(int pattern, bool middle_positive, SidePair out[2]) {
-  const bool diagonal_positive = (pattern == 5) == middle_positive;  // do the segments cut off corners 1 and 3?
+  const bool diagonal_positive =
+      (pattern == 5) == middle_positive;  // do the segments cut off corners 1 and 3?
   out[0] = diagonal_positive ? SidePair{0, 1} : SidePair{3, 0};
   out[1] = diagonal_positive ? SidePair{2, 3} : SidePair{1, 2};
 }
@@ -82,7 +84,9 @@ void remove_short_pieces(double min_length_m, Contour* contour) {
     }
   }
   std::vector<double> length(contour->size());
-  const auto length_of = [](const ContourSegment& s) { return std::hypot(s.a.x_m - s.b.x_m, s.a.y_m - s.b.y_m); };
+  const auto length_of = [](const ContourSegment& s) {
+    return std::hypot(s.a.x_m - s.b.x_m, s.a.y_m - s.b.y_m);
+  };
   for (std::size_t i = 0; i < contour->size(); ++i) length[root(i)] += length_of((*contour)[i]);
   Contour kept;
   for (std::size_t i = 0; i < contour->size(); ++i) {

@@ -14,8 +14,8 @@ struct ContourSegment {
 };
 using Contour = std::vector<ContourSegment>;
 
-/// The zero level of a signed distance sampled at cell centres, by marching squares with linear interpolation; only
-/// where all four corners are known: positive next to unknown is no surface.
+/// The zero level of a signed distance sampled at cell centres, by marching squares with linear
+/// interpolation; only where all four corners are known: positive next to unknown is no surface.
 /// @param value_m  one per cell, NaN = unknown
 Contour extract_zero_level(const GridGeometry& geometry, const std::vector<float>& value_m);
 

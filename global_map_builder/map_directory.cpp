@@ -50,11 +50,12 @@ DistanceMap read_distance_tiff(const fs::path& path, const GridGeometry& geometr
   } catch (const cv::Exception&) {
   }
   if (image.empty() || image.type() != CV_32FC1) {
-    throw UserError(path.string() + ": is not a readable TIFF of 32-bit floats; delete it to have it computed anew.");
+    throw UserError(path.string() +
+                    ": is not a readable TIFF of 32-bit floats; delete it to have it computed anew.");
   }
   if (image.cols != geometry.width_cells || image.rows != geometry.height_cells) {
-    throw UserError(fmt::format("{}: is {} x {} cells, but the map is {} x {}.", path.string(), image.cols, image.rows,
-                                geometry.width_cells, geometry.height_cells));
+    throw UserError(fmt::format("{}: is {} x {} cells, but the map is {} x {}.", path.string(), image.cols,
+                                image.rows, geometry.width_cells, geometry.height_cells));
   }
   DistanceMap map;
   map.geometry = geometry;
@@ -72,7 +73,8 @@ void write_distance_tiff(const fs::path& path, const DistanceMap& map) {
     std::memcpy(image.ptr<float>(row), &map.distance_m[map.geometry.index(0, image.rows - 1 - row)],
                 sizeof(float) * static_cast<std::size_t>(image.cols));
   }
-  if (!cv::imwrite(path.string(), image)) throw UserError(path.string() + ": cannot be written; is the disk full?");
+  if (!cv::imwrite(path.string(), image))
+    throw UserError(path.string() + ": cannot be written; is the disk full?");
 }
 
 OccupancyGrid read_keepout(const fs::path& path, MapImageMeta meta, const GridGeometry& geometry) {
@@ -84,7 +86,8 @@ OccupancyGrid read_keepout(const fs::path& path, MapImageMeta meta, const GridGe
   meta.mode = "trinary";
   meta.negate = false;
   const OccupancyGrid drawn = read_map_image(meta);
-  if (drawn.geometry.width_cells != geometry.width_cells || drawn.geometry.height_cells != geometry.height_cells) {
+  if (drawn.geometry.width_cells != geometry.width_cells ||
+      drawn.geometry.height_cells != geometry.height_cells) {
     throw UserError(path.string() + ": must have as many pixels as the map image.");
   }
   for (std::size_t i = 0; i < drawn.value.size(); ++i) keepout.value[i] = drawn.value[i] == 100 ? 100 : 0;
@@ -96,7 +99,8 @@ std::map<std::string, Pose2> read_places(const fs::path& path) {
   if (!fs::exists(path)) return places;
   const YAML::Node file = load_yaml_file(path.string());
   if (file.IsNull()) return places;
-  if (!file.IsMap()) throw UserError(path.string() + ": must be a map of names, each with x_m, y_m and yaw_rad.");
+  if (!file.IsMap())
+    throw UserError(path.string() + ": must be a map of names, each with x_m, y_m and yaw_rad.");
   for (const auto& entry : file) {
     const auto name = entry.first.as<std::string>();
     Pose2 pose;
@@ -161,12 +165,14 @@ void check_replaceable(const fs::path& directory, bool force) {
   if (fs::is_empty(directory)) return;
   const YAML::Node metadata = read_metadata(directory / "metadata.yaml");
   if (!metadata || metadata.IsNull()) {
-    throw UserError(directory.string() + ": exists and holds something other than a map; choose another directory.");
+    throw UserError(directory.string() +
+                    ": exists and holds something other than a map; choose another directory.");
   }
   for (const char* name : {"keepout.pgm", "places.yaml"}) {
     if (!force && edited(directory, metadata, name)) {
-      throw UserError(fmt::format("{}: {} was edited by hand and would be lost; choose another directory or force it.",
-                                  directory.string(), name));
+      throw UserError(
+          fmt::format("{}: {} was edited by hand and would be lost; choose another directory or force it.",
+                      directory.string(), name));
     }
   }
 }
@@ -178,8 +184,8 @@ bool is_map_directory(const std::string& path) { return fs::is_regular_file(fs::
 std::string map_checksum(const OccupancyGrid& occupancy, const DistanceMap& distance) {
   Hash hash;
   const GridGeometry& g = occupancy.geometry;
-  const double numbers[] = {static_cast<double>(g.width_cells), static_cast<double>(g.height_cells), g.resolution_m,
-                            g.origin_x_m, g.origin_y_m};
+  const double numbers[] = {static_cast<double>(g.width_cells), static_cast<double>(g.height_cells),
+                            g.resolution_m, g.origin_x_m, g.origin_y_m};
   hash.add(numbers, sizeof numbers);
   hash.add(occupancy.value.data(), occupancy.value.size());
   for (const float d : distance.distance_m) {
@@ -205,16 +211,17 @@ DistanceMap distance_from_occupancy(const OccupancyGrid& occupancy) {
   map.distance_m.resize(geometry.cell_count());
   for (std::size_t i = 0; i < wall.size(); ++i) {
     // A cell's surface lies half a cell before its centre.
-    map.distance_m[i] = wall[i]                    ? half - to_open[i]
-                        : occupancy.value[i] < 0   ? std::numeric_limits<float>::quiet_NaN()
-                                                   : to_wall[i] - half;
+    map.distance_m[i] = wall[i]                  ? half - to_open[i]
+                        : occupancy.value[i] < 0 ? std::numeric_limits<float>::quiet_NaN()
+                                                 : to_wall[i] - half;
   }
   return map;
 }
 
 MapDirectory load_map(const std::string& path) {
   const fs::path given(path);
-  if (!fs::exists(given)) throw UserError(path + ": no such map; give a directory written by build_map or a map.yaml.");
+  if (!fs::exists(given))
+    throw UserError(path + ": no such map; give a directory written by build_map or a map.yaml.");
   const fs::path yaml = fs::is_directory(given) ? given / "map.yaml" : given;
   if (!fs::is_regular_file(yaml)) throw UserError(yaml.string() + ": no such file; is this a map directory?");
   const fs::path folder = yaml.parent_path();
@@ -228,8 +235,9 @@ MapDirectory load_map(const std::string& path) {
   const fs::path tiff = folder / "distance.tiff";
   const bool redrawn = ours && edited(folder, metadata, "map.pgm");
   if (redrawn) {
-    map.warnings.push_back((folder / "map.pgm").string() +
-                           ": was edited since the map was built; distances are taken from it, not from distance.tiff.");
+    map.warnings.push_back(
+        (folder / "map.pgm").string() +
+        ": was edited since the map was built; distances are taken from it, not from distance.tiff.");
   }
   if (ours && fs::exists(tiff) && !redrawn) {
     map.distance = read_distance_tiff(tiff, map.occupancy.geometry);
@@ -242,8 +250,10 @@ MapDirectory load_map(const std::string& path) {
   map.keepout = read_keepout(ours ? folder / "keepout.pgm" : fs::path(), meta, map.occupancy.geometry);
   if (ours) {
     map.places = read_places(folder / "places.yaml");
-    if (fs::exists(folder / "trajectory.tum")) map.trajectory = read_trajectory((folder / "trajectory.tum").string());
-    for (const auto& entry : metadata["about"]) map.about[entry.first.as<std::string>()] = entry.second.as<std::string>();
+    if (fs::exists(folder / "trajectory.tum"))
+      map.trajectory = read_trajectory((folder / "trajectory.tum").string());
+    for (const auto& entry : metadata["about"])
+      map.about[entry.first.as<std::string>()] = entry.second.as<std::string>();
   }
   map.checksum = map_checksum(map.occupancy, map.distance);
   map.distance.checksum = map.checksum;

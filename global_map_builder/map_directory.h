@@ -18,24 +18,24 @@ namespace knav {
 ///   keepout.pgm         black = never drive there     places.yaml    NAME: {x_m: , y_m: , yaw_rad: }
 ///   trajectory.tum      of the mapping drive          metadata.yaml  version, checksums, how it was made
 struct MapDirectory {
-  OccupancyGrid occupancy;               ///< 0 free, 100 occupied, -1 unknown
-  DistanceMap distance;                  ///< its checksum is that of the map
-  OccupancyGrid keepout;                 ///< 100 = keep out, 0 elsewhere; all 0 if there is no keepout.pgm
-  std::map<std::string, Pose2> places;   ///< T_map_robot of named goals
-  Trajectory trajectory;                 ///< may be empty
-  std::string checksum;                  ///< 16 hex digits over occupancy, distance and geometry
+  OccupancyGrid occupancy;              ///< 0 free, 100 occupied, -1 unknown
+  DistanceMap distance;                 ///< its checksum is that of the map
+  OccupancyGrid keepout;                ///< 100 = keep out, 0 elsewhere; all 0 if there is no keepout.pgm
+  std::map<std::string, Pose2> places;  ///< T_map_robot of named goals
+  Trajectory trajectory;                ///< may be empty
+  std::string checksum;                 ///< 16 hex digits over occupancy, distance and geometry
   std::map<std::string, std::string> about;  ///< free text from metadata.yaml: how the map was made
-  std::vector<std::string> warnings;     ///< of load_map, e.g. that map.pgm was edited by hand
+  std::vector<std::string> warnings;         ///< of load_map, e.g. that map.pgm was edited by hand
 };
 
-/// Reads a map directory, or a plain map_server map by its YAML file (modes trinary, scale, raw). A map without
-/// distance.tiff, or whose map.pgm was edited since, gets its distance map from the occupied cells. UserError
-/// names the file at fault.
+/// Reads a map directory, or a plain map_server map by its YAML file (modes trinary, scale, raw). A map
+/// without distance.tiff, or whose map.pgm was edited since, gets its distance map from the occupied cells.
+/// UserError names the file at fault.
 MapDirectory load_map(const std::string& path);
 
-/// Writes all files beside `directory`, then renames: readers see the old map or the whole new one. An existing map
-/// is replaced, but a directory that holds anything else is refused (UserError), and so is, unless `force`, a map
-/// whose keepout.pgm or places.yaml were edited by hand.
+/// Writes all files beside `directory`, then renames: readers see the old map or the whole new one. An
+/// existing map is replaced, but a directory that holds anything else is refused (UserError), and so is,
+/// unless `force`, a map whose keepout.pgm or places.yaml were edited by hand.
 /// @param more  writes further files into the directory it is given, before the rename; may be empty
 /// @return the checksum
 std::string save_map(const std::string& directory, const MapDirectory& map, bool force = false,
@@ -44,8 +44,8 @@ std::string save_map(const std::string& directory, const MapDirectory& map, bool
 /// The checksum load_map and save_map give.
 std::string map_checksum(const OccupancyGrid& occupancy, const DistanceMap& distance);
 
-/// Distance [m] to the surface of the nearest occupied cell (its outer edge): positive in free cells, negative in
-/// occupied cells, NaN in unknown ones. For maps that carry no contour.
+/// Distance [m] to the surface of the nearest occupied cell (its outer edge): positive in free cells,
+/// negative in occupied cells, NaN in unknown ones. For maps that carry no contour.
 DistanceMap distance_from_occupancy(const OccupancyGrid& occupancy);
 
 /// True if `path` is a map directory (has a map.yaml).

@@ -44,8 +44,8 @@ void check_pgm_size(const std::string& path) {
   const auto start = static_cast<long long>(file.tellg());
   const auto size = static_cast<long long>(std::filesystem::file_size(path));
   if (size - start < needed) {
-    throw UserError(fmt::format("{}: is cut off; {} x {} pixels need {} bytes more.", path, numbers[0], numbers[1],
-                                needed - (size - start)));
+    throw UserError(fmt::format("{}: is cut off; {} x {} pixels need {} bytes more.", path, numbers[0],
+                                numbers[1], needed - (size - start)));
   }
 }
 
@@ -68,12 +68,14 @@ std::int8_t occupancy_of(double gray, double alpha, const MapImageMeta& meta) {
 
 MapImageMeta read_map_yaml(const std::string& path) {
   const YAML::Node file = load_yaml_file(path);
-  if (!file.IsMap()) throw UserError(path + ": is not a map_server YAML file (keys image, resolution, origin, ...).");
+  if (!file.IsMap())
+    throw UserError(path + ": is not a map_server YAML file (keys image, resolution, origin, ...).");
   MapImageMeta meta;
   const std::filesystem::path image = required<std::string>(file, path, "image");
   meta.image = (image.is_absolute() ? image : std::filesystem::path(path).parent_path() / image).string();
   meta.resolution_m = required<double>(file, path, "resolution");
-  check(std::isfinite(meta.resolution_m) && meta.resolution_m > 0.0, path, "resolution", "must be metres above 0");
+  check(std::isfinite(meta.resolution_m) && meta.resolution_m > 0.0, path, "resolution",
+        "must be metres above 0");
   const auto origin = required<std::vector<double>>(file, path, "origin");
   check(origin.size() >= 2 && std::isfinite(origin[0]) && std::isfinite(origin[1]), path, "origin",
         "must be [x, y, yaw] in metres and radians");
@@ -96,10 +98,11 @@ MapImageMeta read_map_yaml(const std::string& path) {
 
 void write_map_yaml(const std::string& path, const MapImageMeta& meta) {
   std::ofstream file(path);
-  file << fmt::format("image: {}\nmode: {}\nresolution: {}\norigin: [{}, {}, 0.0]\nnegate: {}\noccupied_thresh: {}\n"
-                      "free_thresh: {}\n",
-                      meta.image, meta.mode, meta.resolution_m, meta.origin_x_m, meta.origin_y_m, meta.negate ? 1 : 0,
-                      meta.occupied_thresh, meta.free_thresh);
+  file << fmt::format(
+      "image: {}\nmode: {}\nresolution: {}\norigin: [{}, {}, 0.0]\nnegate: {}\noccupied_thresh: {}\n"
+      "free_thresh: {}\n",
+      meta.image, meta.mode, meta.resolution_m, meta.origin_x_m, meta.origin_y_m, meta.negate ? 1 : 0,
+      meta.occupied_thresh, meta.free_thresh);
   file.close();
   if (!file) throw UserError(path + ": cannot be written; is the disk full?");
 }
@@ -128,7 +131,8 @@ OccupancyGrid read_map_image(const MapImageMeta& meta) {
     for (int column = 0; column < image.cols; ++column, pixel += channels) {
       double sum = 0.0;
       for (int k = 0; k < colors; ++k) sum += pixel[k];
-      const double alpha = channels == 1 ? 1.0 : pixel[channels - 1];  // 0 ... 255, compared with 1 as map_server does
+      const double alpha =
+          channels == 1 ? 1.0 : pixel[channels - 1];  // 0 ... 255, compared with 1 as map_server does
       grid.value[grid.geometry.index(column, image.rows - 1 - row)] = occupancy_of(sum / colors, alpha, meta);
     }
   }

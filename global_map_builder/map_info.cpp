@@ -40,13 +40,15 @@ void map_info(const std::string& path, const std::string& json, const std::strin
   write_json(json, out.dump(2));
   if (!picture.empty()) write_map_picture(picture, map);
   if (json != "-") {
-    fmt::print("{}: {:.2f} x {:.2f} m at {} m, origin ({:.3f}, {:.3f})\n", path, g.width_cells * g.resolution_m,
-               g.height_cells * g.resolution_m, g.resolution_m, g.origin_x_m, g.origin_y_m);
+    fmt::print("{}: {:.2f} x {:.2f} m at {} m, origin ({:.3f}, {:.3f})\n", path,
+               g.width_cells * g.resolution_m, g.height_cells * g.resolution_m, g.resolution_m, g.origin_x_m,
+               g.origin_y_m);
     fmt::print("free {:.1f} m2, {} occupied cells, keepout {:.1f} m2, {} places, {} trajectory poses\n",
-               static_cast<double>(free) * cell_m2, occupied, static_cast<double>(keepout) * cell_m2, map.places.size(),
-               map.trajectory.size());
+               static_cast<double>(free) * cell_m2, occupied, static_cast<double>(keepout) * cell_m2,
+               map.places.size(), map.trajectory.size());
     for (const auto& [key, value] : map.about) fmt::print("{}: {}\n", key, value);
-    fmt::print("checksum {}: {}\n", map.checksum, map.warnings.empty() ? "whole" : "changed since it was built");
+    fmt::print("checksum {}: {}\n", map.checksum,
+               map.warnings.empty() ? "whole" : "changed since it was built");
   }
   for (const std::string& warning : map.warnings) fmt::print(stderr, "map_info: {}\n", warning);
 }
@@ -55,12 +57,15 @@ void map_info(const std::string& path, const std::string& json, const std::strin
 }  // namespace knav
 
 int main(int argc, char** argv) {
-  CLI::App app("Prints and verifies a map directory, or a map_server map by its YAML file. Exit code 1 if it cannot be used.");
+  CLI::App app(
+      "Prints and verifies a map directory, or a map_server map by its YAML file. Exit code 1 if it cannot "
+      "be used.");
   std::string path, json, picture;
   app.add_option("MAP", path, "map directory or map.yaml")->required();
-  app.add_option("--json", json,
-                 "write {width_m, height_m, resolution_m, origin_x_m, origin_y_m, free_m2, occupied_cells, keepout_m2, "
-                 "trajectory_poses, places, about, checksum, warnings} here; '-' = standard output");
+  app.add_option(
+      "--json", json,
+      "write {width_m, height_m, resolution_m, origin_x_m, origin_y_m, free_m2, occupied_cells, keepout_m2, "
+      "trajectory_poses, places, about, checksum, warnings} here; '-' = standard output");
   app.add_option("--picture", picture, "PNG to write");
   return knav::run_command(app, argc, argv, [&] { knav::map_info(path, json, picture); });
 }

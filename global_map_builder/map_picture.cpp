@@ -33,7 +33,8 @@ struct Canvas {
   cv::Point at(const Pose2& p) const {
     const double scale = zoom / geometry.resolution_m * (1 << kShift);
     return {static_cast<int>((p.x_m - geometry.origin_x_m) * scale),
-            static_cast<int>((geometry.origin_y_m + geometry.height_cells * geometry.resolution_m - p.y_m) * scale)};
+            static_cast<int>((geometry.origin_y_m + geometry.height_cells * geometry.resolution_m - p.y_m) *
+                             scale)};
   }
   void line(const Pose2& a, const Pose2& b, const cv::Scalar& color, int width) {
     cv::line(image, at(a), at(b), color, width, cv::LINE_AA, kShift);
@@ -44,8 +45,8 @@ struct Canvas {
     const int pixels = static_cast<int>(length_m / geometry.resolution_m * zoom);
     const cv::Point left(12, image.rows - 12);
     cv::line(image, left, left + cv::Point(pixels, 0), {0, 0, 0}, 3);
-    cv::putText(image, fmt::format("{:.0f} m", length_m), left + cv::Point(0, -8), cv::FONT_HERSHEY_SIMPLEX, 0.5,
-                {0, 0, 0}, 1, cv::LINE_AA);
+    cv::putText(image, fmt::format("{:.0f} m", length_m), left + cv::Point(0, -8), cv::FONT_HERSHEY_SIMPLEX,
+                0.5, {0, 0, 0}, 1, cv::LINE_AA);
   }
   void write(const std::string& path) const {
     if (!cv::imwrite(path, image)) throw UserError(path + ": cannot be written; is the disk full?");
@@ -70,7 +71,8 @@ void write_map_picture(const std::string& path, const BuiltMap& built) {
     const Pose2& to = built.keyframes[static_cast<std::size_t>(c.to)];
     const cv::Scalar color = c.accepted ? cv::Scalar(0, 160, 0) : cv::Scalar(255, 0, 255);
     canvas.line(from, to, color, 1);
-    cv::circle(canvas.image, canvas.at(to), 3 << kShift, color, c.source == "button" ? cv::FILLED : 1, cv::LINE_AA, kShift);
+    cv::circle(canvas.image, canvas.at(to), 3 << kShift, color, c.source == "button" ? cv::FILLED : 1,
+               cv::LINE_AA, kShift);
   }
   canvas.scale_bar();
   canvas.write(path);

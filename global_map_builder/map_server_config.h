@@ -11,7 +11,8 @@ struct MapServerConfig {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.text("map_path", map_path, "Map directory written by build_map, or a map_server YAML file; empty: none yet.");
+    v.text("map_path", map_path,
+           "Map directory written by build_map, or a map_server YAML file; empty: none yet.");
     v.text("frame_id", frame_id, "Frame of the maps.");
   }
   std::vector<std::string> validate() const {

@@ -4,10 +4,10 @@
 #include <nav_msgs/GetMap.h>
 #include <nav_msgs/OccupancyGrid.h>
 #include <nav_msgs/SetMap.h>
-#include <pluginlib/class_list_macros.hpp>
 #include <ros/ros.h>
 
 #include <mutex>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "global_map_builder/map_directory.h"
 #include "global_map_builder/map_server_config.h"
@@ -17,8 +17,8 @@
 
 namespace knav {
 
-/// Serves a map directory, or a plain map_server map: map, map_metadata, distance_map, keepout_map (latched) and the
-/// services static_map, get_distance_map, load_map.
+/// Serves a map directory, or a plain map_server map: map, map_metadata, distance_map, keepout_map (latched)
+/// and the services static_map, get_distance_map, load_map.
 class MapServerNodelet : public NodeletBase {
  protected:
   void start() override {
@@ -60,8 +60,9 @@ class MapServerNodelet : public NodeletBase {
     map_publisher_.publish(nav_msgs::OccupancyGrid::ConstPtr(occupancy));
     keepout_publisher_.publish(nav_msgs::OccupancyGrid::ConstPtr(keepout));
     distance_publisher_.publish(kinect_nav::DistanceMap::ConstPtr(distance));
-    NODELET_INFO("Serving a map of %u x %u cells at %.3f m, checksum %s.", occupancy->info.width, occupancy->info.height,
-                 static_cast<double>(occupancy->info.resolution), map.checksum.c_str());
+    NODELET_INFO("Serving a map of %u x %u cells at %.3f m, checksum %s.", occupancy->info.width,
+                 occupancy->info.height, static_cast<double>(occupancy->info.resolution),
+                 map.checksum.c_str());
   }
 
   bool on_static_map(nav_msgs::GetMap::Request&, nav_msgs::GetMap::Response& response) {
@@ -98,7 +99,9 @@ class MapServerNodelet : public NodeletBase {
     call.request.map = *occupancy_;
     call.request.initial_pose.header = occupancy_->header;
     call.request.initial_pose.pose = pose;
-    if (ros::service::exists("set_map", false) && ros::service::call("set_map", call) && call.response.success) return;
+    if (ros::service::exists("set_map", false) && ros::service::call("set_map", call) &&
+        call.response.success)
+      return;
     response->message += "; but no localizer took the pose (service set_map)";
   }
 

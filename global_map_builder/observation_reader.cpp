@@ -43,7 +43,8 @@ Pose2 planar_optical(const Eigen::Isometry3d& T) {
 
 /// A scanner mounted upside down turns clockwise.
 void flip(RangeScan* scan) {
-  const double last = scan->angle_min_rad + scan->angle_increment_rad * static_cast<double>(scan->range_m.size() - 1);
+  const double last =
+      scan->angle_min_rad + scan->angle_increment_rad * static_cast<double>(scan->range_m.size() - 1);
   scan->angle_min_rad = -last;
   std::reverse(scan->range_m.begin(), scan->range_m.end());
   std::reverse(scan->evidence.begin(), scan->evidence.end());
@@ -111,14 +112,16 @@ class ObservationReader::Impl {
   /// `name` if the bag has it, else the only topic of that type, else empty.
   std::string topic_or_only(const std::string& name, const std::string& type) {
     const auto topics = bag_.topics_of_type(type);
-    const auto same = [&](const std::string& t) { return without_leading_slash(t) == without_leading_slash(name); };
+    const auto same = [&](const std::string& t) {
+      return without_leading_slash(t) == without_leading_slash(name);
+    };
     if (std::any_of(topics.begin(), topics.end(), same)) return name;
     if (bag_.has_topic(name)) {
       throw UserError(fmt::format("{}: topic '{}' is not of type {}.", bag_.path(), name, type));
     }
     if (topics.size() != 1) return "";
-    warnings_.push_back(fmt::format("topic '{}' is not in {}; taking '{}', its only {}.", name, bag_.path(), topics[0],
-                                    type));
+    warnings_.push_back(fmt::format("topic '{}' is not in {}; taking '{}', its only {}.", name, bag_.path(),
+                                    topics[0], type));
     return topics[0];
   }
 
@@ -191,8 +194,9 @@ class ObservationReader::Impl {
       upside_down_ = source_ == "scan" && T_base_sensor_.linear()(2, 2) < 0.0;
       return;
     }
-    const std::string missing = fmt::format("{}: has no transform from '{}' to the sensor's frame '{}' on tf_static or tf",
-                                            bag_.path(), base_frame_, sensor);
+    const std::string missing =
+        fmt::format("{}: has no transform from '{}' to the sensor's frame '{}' on tf_static or tf",
+                    bag_.path(), base_frame_, sensor);
     if (source_ == "depth") throw UserError(missing + "; the camera's height and tilt must be known.");
     warnings_.push_back(missing + "; taking the sensor to be at the robot's centre, looking forward.");
   }
@@ -204,7 +208,9 @@ class ObservationReader::Impl {
       for (const auto& transform : tf->transforms) {
         const bool above_base = without_leading_slash(transform.child_frame_id) == base_frame_;
         Eigen::Isometry3d T_base_sensor;
-        if (above_base || !transforms.replace(transform) || !transforms.find(base_frame_, sensor, &T_base_sensor)) continue;
+        if (above_base || !transforms.replace(transform) ||
+            !transforms.find(base_frame_, sensor, &T_base_sensor))
+          continue;
         mount_.add(transform.header.stamp.toSec(), T_base_sensor);
       }
     });
@@ -218,7 +224,8 @@ class ObservationReader::Impl {
       throw Found{};
     });
     if (!camera_.raw.valid() || !camera_.rectified.valid()) {
-      throw UserError(fmt::format("{}: topic '{}' describes no camera (size or focal length is 0).", bag_.path(), topic));
+      throw UserError(
+          fmt::format("{}: topic '{}' describes no camera (size or focal length is 0).", bag_.path(), topic));
     }
   }
 
@@ -236,7 +243,8 @@ class ObservationReader::Impl {
     try {
       out = message.instantiate<Message>();
     } catch (const std::exception& error) {
-      throw UserError(fmt::format("{}: a message on '{}' is malformed ({}).", bag_.path(), message.getTopic(), error.what()));
+      throw UserError(fmt::format("{}: a message on '{}' is malformed ({}).", bag_.path(), message.getTopic(),
+                                  error.what()));
     }
     if (!out) {
       throw UserError(fmt::format("{}: topic '{}' has type {}, expected {}.", bag_.path(), message.getTopic(),
@@ -271,7 +279,8 @@ class ObservationReader::Impl {
       const auto button = static_cast<std::size_t>(config_.mark_button);
       const bool pressed = button < joy->buttons.size() && joy->buttons[button] != 0;
       if (pressed && !joy_pressed_) {
-        add_pending(joy->header.stamp.isZero() ? message.getTime() : joy->header.stamp, Pending{Kind::kMark, {}, {}, {}});
+        add_pending(joy->header.stamp.isZero() ? message.getTime() : joy->header.stamp,
+                    Pending{Kind::kMark, {}, {}, {}});
       }
       joy_pressed_ = pressed;
     }
@@ -279,9 +288,10 @@ class ObservationReader::Impl {
 
   void check_clock(double stamp_s, double newest_s, const char* what) const {
     if (stamp_s < newest_s - kClockJump_s - config_.reorder_s) {
-      throw UserError(fmt::format("{}: the clock of its {} jumps back by {:.1f} s at {:.3f}; cut the recording there "
-                                  "('rosbag filter') and use one part.",
-                                  bag_.path(), what, newest_s - stamp_s, newest_s));
+      throw UserError(
+          fmt::format("{}: the clock of its {} jumps back by {:.1f} s at {:.3f}; cut the recording there "
+                      "('rosbag filter') and use one part.",
+                      bag_.path(), what, newest_s - stamp_s, newest_s));
     }
   }
 
@@ -371,15 +381,19 @@ class ObservationReader::Impl {
   bool process(double stamp_s, const sensor_msgs::Image& image) {
     const bool millimetres = image.encoding == "16UC1" || image.encoding == "mono16";
     if (!millimetres && image.encoding != "32FC1") {
-      throw UserError(fmt::format("{}: topic '{}' has images of encoding '{}'; expected 16UC1 (mm) or 32FC1 (m).",
-                                  bag_.path(), topic_, image.encoding));
+      throw UserError(
+          fmt::format("{}: topic '{}' has images of encoding '{}'; expected 16UC1 (mm) or 32FC1 (m).",
+                      bag_.path(), topic_, image.encoding));
     }
     const std::size_t pixel_bytes = millimetres ? 2 : 4;
-    if (image.step < image.width * pixel_bytes || image.data.size() < std::size_t{image.step} * image.height) {
-      throw UserError(fmt::format("{}: topic '{}' has an image with too few bytes for its size.", bag_.path(), topic_));
+    if (image.step < image.width * pixel_bytes ||
+        image.data.size() < std::size_t{image.step} * image.height) {
+      throw UserError(
+          fmt::format("{}: topic '{}' has an image with too few bytes for its size.", bag_.path(), topic_));
     }
-    const cv::Mat depth(static_cast<int>(image.height), static_cast<int>(image.width), millimetres ? CV_16UC1 : CV_32FC1,
-                        const_cast<std::uint8_t*>(image.data.data()), image.step);
+    const cv::Mat depth(static_cast<int>(image.height), static_cast<int>(image.width),
+                        millimetres ? CV_16UC1 : CV_32FC1, const_cast<std::uint8_t*>(image.data.data()),
+                        image.step);
     if (!mount_.empty()) {
       T_base_sensor_ = mount_.at(stamp_s);
       T_plane_ = planar_optical(T_base_sensor_);
@@ -391,17 +405,20 @@ class ObservationReader::Impl {
 
   void report() {
     if (statistics_.rejected > 0) {
-      warnings_.push_back(fmt::format("{} observations could not be used: {}", statistics_.rejected, last_fault_));
+      warnings_.push_back(
+          fmt::format("{} observations could not be used: {}", statistics_.rejected, last_fault_));
     }
     if (statistics_.late > 0) {
-      warnings_.push_back(fmt::format("{} observations came more than {} s late and were left out.", statistics_.late,
-                                      config_.reorder_s));
+      warnings_.push_back(fmt::format("{} observations came more than {} s late and were left out.",
+                                      statistics_.late, config_.reorder_s));
     }
     if (statistics_.without_stamp > 0) {
-      warnings_.push_back(fmt::format("{} messages carry no stamp and were left out.", statistics_.without_stamp));
+      warnings_.push_back(
+          fmt::format("{} messages carry no stamp and were left out.", statistics_.without_stamp));
     }
     if (bad_odometry_ > 0) {
-      warnings_.push_back(fmt::format("{} odometry messages hold NaN or no stamp and were left out.", bad_odometry_));
+      warnings_.push_back(
+          fmt::format("{} odometry messages hold NaN or no stamp and were left out.", bad_odometry_));
     }
   }
 

@@ -42,7 +42,8 @@ struct ObservationReaderConfig {
     v.text("joy_topic", joy_topic, "sensor_msgs/Joy, whose button mark_button means the same.");
     v.text("base_frame", base_frame, "The robot's frame, where the odometry names none (child_frame_id).");
     v.integer("mark_button", mark_button, 0, 31, "", "Index of the joystick's button that marks a place.");
-    v.number("reorder_s", reorder_s, 0.0, 10.0, "s", "How late a message may come and still be put in order.");
+    v.number("reorder_s", reorder_s, 0.0, 10.0, "s",
+             "How late a message may come and still be put in order.");
     v.number("odometry_ahead_s", odometry_ahead_s, 0.0, 1.0, "s",
              "Odometry up to this long after an observation is given before it, to interpolate.");
   }
@@ -58,9 +59,9 @@ struct ObservationCallbacks {
   std::function<void(double fraction)> progress;  ///< in [0, 1]
 };
 
-/// Reads a bag as fast as it goes, with no master: the observations of one source, odometry and button marks, each
-/// kind and all kinds together in the order of their stamps, odometry a little ahead. Depth images pass through the
-/// front end. The same bag gives the same calls.
+/// Reads a bag as fast as it goes, with no master: the observations of one source, odometry and button marks,
+/// each kind and all kinds together in the order of their stamps, odometry a little ahead. Depth images pass
+/// through the front end. The same bag gives the same calls.
 class ObservationReader {
  public:
   /// UserError if the bag is unreadable, or lacks the source or odometry; names the topic.
@@ -75,10 +76,10 @@ class ObservationReader {
 
   /// Of the last read().
   struct Statistics {
-    std::size_t observations = 0;     ///< handed over
-    std::size_t rejected = 0;         ///< depth frames the front end refused
-    std::size_t late = 0;             ///< came too late to be put in order
-    std::size_t without_stamp = 0;    ///< stamp 0
+    std::size_t observations = 0;   ///< handed over
+    std::size_t rejected = 0;       ///< depth frames the front end refused
+    std::size_t late = 0;           ///< came too late to be put in order
+    std::size_t without_stamp = 0;  ///< stamp 0
     std::size_t odometry = 0;
     std::size_t marks = 0;
     double first_stamp_s = 0.0, last_stamp_s = 0.0;  ///< of observations

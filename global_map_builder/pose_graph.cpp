@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -24,7 +23,8 @@ struct LineReader {
   }
   void numbers(std::istringstream& words, double* value, int count) const {
     for (int i = 0; i < count; ++i) {
-      if (!(words >> value[i]) || !std::isfinite(value[i])) fail(fmt::format("needs {} finite numbers here", count));
+      if (!(words >> value[i]) || !std::isfinite(value[i]))
+        fail(fmt::format("needs {} finite numbers here", count));
     }
   }
 };
@@ -77,7 +77,8 @@ PoseGraph read_pose_graph(const std::string& path) {
     } else if (tag == "EDGE_SE2" || tag == "EDGE2") {
       graph.edges.push_back(read_edge(reader, words, tag == "EDGE2" ? Order::kToro : Order::kG2o));
     } else if (tag != "FIX" && tag != "EQUIV") {
-      reader.fail(fmt::format("'{}' is not known; only VERTEX_SE2, EDGE_SE2 (g2o), VERTEX2 and EDGE2 (TORO) are", tag));
+      reader.fail(fmt::format(
+          "'{}' is not known; only VERTEX_SE2, EDGE_SE2 (g2o), VERTEX2 and EDGE2 (TORO) are", tag));
     }
   }
   if (graph.edges.empty()) throw UserError(path + ": no edges; expected a 2D pose graph of g2o or TORO.");
@@ -95,9 +96,9 @@ void write_pose_graph(const std::string& path, const PoseGraph& graph) {
   }
   for (const PoseGraphEdge& edge : graph.edges) {
     const auto& m = edge.information;
-    text += fmt::format("EDGE_SE2 {} {} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g}\n", edge.from,
-                        edge.to, edge.T_from_to.x_m, edge.T_from_to.y_m, edge.T_from_to.yaw_rad, m(0, 0), m(0, 1),
-                        m(0, 2), m(1, 1), m(1, 2), m(2, 2));
+    text += fmt::format("EDGE_SE2 {} {} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g}\n",
+                        edge.from, edge.to, edge.T_from_to.x_m, edge.T_from_to.y_m, edge.T_from_to.yaw_rad,
+                        m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2));
   }
   write_text_atomically(path, text);
 }

@@ -9,8 +9,8 @@
 
 namespace knav {
 
-/// A measured relative pose. Error e = (position, heading) of T_measured^-1 * (T_map_from^-1 * T_map_to), i.e. in
-/// the measured frame of `to` as g2o defines it; it counts e' information e.
+/// A measured relative pose. Error e = (position, heading) of T_measured^-1 * (T_map_from^-1 * T_map_to),
+/// i.e. in the measured frame of `to` as g2o defines it; it counts e' information e.
 struct PoseGraphEdge {
   int from = 0, to = 0;
   Pose2 T_from_to;
@@ -23,8 +23,8 @@ struct PoseGraph {
   std::vector<PoseGraphEdge> edges;
 };
 
-/// g2o's VERTEX_SE2 / EDGE_SE2, or TORO's VERTEX2 / EDGE2, told apart by the tags. Nodes that only edges name start
-/// from the edge. UserError names file and line.
+/// g2o's VERTEX_SE2 / EDGE_SE2, or TORO's VERTEX2 / EDGE2, told apart by the tags. Nodes that only edges name
+/// start from the edge. UserError names file and line.
 PoseGraph read_pose_graph(const std::string& path);
 /// g2o; atomic.
 void write_pose_graph(const std::string& path, const PoseGraph& graph);

@@ -14,8 +14,8 @@ struct SurfacePoint {
   float x_m, y_m, normal_x, normal_y;
 };
 
-/// What the robot saw round one keyframe, in the keyframe's frame: points to lay on another submap, and a signed
-/// distance field to lay another's points on.
+/// What the robot saw round one keyframe, in the keyframe's frame: points to lay on another submap, and a
+/// signed distance field to lay another's points on.
 class Submap {
  public:
   /// Observations with poses relative to the keyframe (T_keyframe_sensor in T_map_sensor).
@@ -25,7 +25,8 @@ class Submap {
   const GridGeometry& geometry() const { return geometry_; }
   bool empty() const { return points_.empty(); }
 
-  /// Distance [m] to the surface in the cell of a point, `far` outside; never-seen cells count as behind (negative).
+  /// Distance [m] to the surface in the cell of a point, `far` outside; never-seen cells count as behind
+  /// (negative).
   float nearest(float x_m, float y_m, float far) const {
     const int ix = geometry_.cell_x(x_m), iy = geometry_.cell_y(y_m);
     return geometry_.contains(ix, iy) ? signed_m_[geometry_.index(ix, iy)] : far;

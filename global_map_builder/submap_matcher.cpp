@@ -18,9 +18,9 @@ constexpr double kPointSpacing_m = 0.1;  // as Submap samples its contour
 constexpr float kCoarseReach_m = 0.6f;   // beyond this a point scores nothing
 constexpr double kCoarseStep_m = 0.2;
 constexpr double kFineReach_m = 0.3;
-constexpr double kWaviness = 0.015;      // mean square of a contour's slope error
+constexpr double kWaviness = 0.015;  // mean square of a contour's slope error
 constexpr double kInlier_m = 0.15;
-constexpr double kMinFacing = 0.7;  // cosine between two surfaces' normals
+constexpr double kMinFacing = 0.7;          // cosine between two surfaces' normals
 constexpr std::size_t kCoarsePoints = 120;  // at most 257, or the 16-bit sums overflow
 constexpr std::size_t kPeaks = 8;
 constexpr double kPeakShare = 0.6;
@@ -42,7 +42,8 @@ std::vector<SurfacePoint> thin(const std::vector<SurfacePoint>& points, std::siz
   return out;
 }
 
-/// What a point scores in each coarse cell, 255 on a surface, 0 from kCoarseReach_m on; with a border of zeros.
+/// What a point scores in each coarse cell, 255 on a surface, 0 from kCoarseReach_m on; with a border of
+/// zeros.
 struct ScoreGrid {
   int width = 0, height = 0;
   double origin_x_m = 0.0, origin_y_m = 0.0;
@@ -60,7 +61,8 @@ struct ScoreGrid {
         const auto x = static_cast<float>(origin_x_m + (ix + 0.5) * kCoarseStep_m);
         const auto y = static_cast<float>(origin_y_m + (iy + 0.5) * kCoarseStep_m);
         const float d = std::fabs(map.nearest(x, y, 1e3f));
-        if (d < kCoarseReach_m) score[at(ix, iy)] = static_cast<std::uint8_t>(255.0f * (1.0f - d / kCoarseReach_m));
+        if (d < kCoarseReach_m)
+          score[at(ix, iy)] = static_cast<std::uint8_t>(255.0f * (1.0f - d / kCoarseReach_m));
       }
     }
   }
@@ -79,12 +81,14 @@ void add_shifts(const std::uint8_t* first, int side, int width, std::uint16_t* s
   }
 }
 
-/// Every pose of the window on a lattice, scored by the coarse cell of each point; the best of each neighbourhood.
-std::vector<Candidate> search(const MatchConfig& config, const Submap& from, const Submap& to, const Pose2& prior,
-                              const MatchWindow& window) {
+/// Every pose of the window on a lattice, scored by the coarse cell of each point; the best of each
+/// neighbourhood.
+std::vector<Candidate> search(const MatchConfig& config, const Submap& from, const Submap& to,
+                              const Pose2& prior, const MatchWindow& window) {
   const std::vector<SurfacePoint> points = thin(to.points(), kCoarsePoints);
   double reach_m = 1.0;
-  for (const SurfacePoint& p : points) reach_m = std::max(reach_m, static_cast<double>(std::hypot(p.x_m, p.y_m)));
+  for (const SurfacePoint& p : points)
+    reach_m = std::max(reach_m, static_cast<double>(std::hypot(p.x_m, p.y_m)));
   const double angle_step = std::min(2.0 * kCoarseStep_m / reach_m, 0.06);
   const int turns = static_cast<int>(std::ceil(window.angle_rad / angle_step));
   const int steps = static_cast<int>(std::ceil(window.radius_m / kCoarseStep_m)), side = 2 * steps + 1;
@@ -99,7 +103,8 @@ std::vector<Candidate> search(const MatchConfig& config, const Submap& from, con
       const double x = prior.x_m + c * p.x_m - s * p.y_m, y = prior.y_m + s * p.x_m + c * p.y_m;
       const int ix = static_cast<int>(std::floor((x - grid.origin_x_m) / kCoarseStep_m)) - steps;
       const int iy = static_cast<int>(std::floor((y - grid.origin_y_m) / kCoarseStep_m)) - steps;
-      if (ix < 0 || iy < 0 || ix + side > grid.width || iy + side > grid.height) continue;  // never near a surface
+      if (ix < 0 || iy < 0 || ix + side > grid.width || iy + side > grid.height)
+        continue;  // never near a surface
       add_shifts(&grid.score[grid.at(ix, iy)], side, grid.width, sum.data());
     }
     for (int iy = -steps; iy <= steps; ++iy) {
@@ -108,7 +113,9 @@ std::vector<Candidate> search(const MatchConfig& config, const Submap& from, con
         const double score = sum[i] / (255.0 * static_cast<double>(points.size()));
         if (score < kPeakShare * best || ix * ix + iy * iy > steps * steps) continue;
         best = std::max(best, score);
-        all.push_back({{prior.x_m + ix * kCoarseStep_m, prior.y_m + iy * kCoarseStep_m, normalize_angle_rad(yaw)}, score});
+        all.push_back(
+            {{prior.x_m + ix * kCoarseStep_m, prior.y_m + iy * kCoarseStep_m, normalize_angle_rad(yaw)},
+             score});
       }
     }
   }
@@ -119,8 +126,9 @@ std::vector<Candidate> search(const MatchConfig& config, const Submap& from, con
   std::vector<Candidate> peaks;
   for (const Candidate& candidate : all) {
     if (peaks.size() == kPeaks || candidate.score < kPeakShare * best) break;
-    const bool taken = std::any_of(peaks.begin(), peaks.end(),
-                                   [&](const Candidate& peak) { return same_place(config, peak.pose, candidate.pose); });
+    const bool taken = std::any_of(peaks.begin(), peaks.end(), [&](const Candidate& peak) {
+      return same_place(config, peak.pose, candidate.pose);
+    });
     if (!taken) peaks.push_back(candidate);
   }
   return peaks;
@@ -133,8 +141,8 @@ struct Fit {
   double score = 0.0;
 };
 
-/// Gauss-Newton on the signed distance, each point fading out (Tukey) towards kFineReach_m and where the surfaces
-/// face opposite ways, as the two sides of a thin wall do.
+/// Gauss-Newton on the signed distance, each point fading out (Tukey) towards kFineReach_m and where the
+/// surfaces face opposite ways, as the two sides of a thin wall do.
 Fit refine(const Submap& from, const Submap& to, const Pose2& start) {
   Fit fit{start};
   for (int iteration = 0; iteration < 20; ++iteration) {
@@ -148,7 +156,8 @@ Fit refine(const Submap& from, const Submap& to, const Pose2& start) {
       Eigen::Vector2d gradient;
       if (!from.interpolate(fit.pose.x_m + rx, fit.pose.y_m + ry, &d, &gradient)) continue;
       if (std::fabs(d) >= kFineReach_m || gradient.norm() < 0.3) continue;
-      const double facing = (c * p.normal_x - s * p.normal_y) * gradient.x() + (s * p.normal_x + c * p.normal_y) * gradient.y();
+      const double facing =
+          (c * p.normal_x - s * p.normal_y) * gradient.x() + (s * p.normal_x + c * p.normal_y) * gradient.y();
       // Past the end of the other's contour the distance pulls along the wall, which says nothing.
       if (facing < kMinFacing * gradient.norm()) continue;
       const double q = 1.0 - d * d / (kFineReach_m * kFineReach_m);
@@ -187,7 +196,8 @@ Agreement agreement_of(const Submap& from, const Submap& to, const Pose2& T_from
     Eigen::Vector2d gradient;
     if (!from.interpolate(x, y, &d, &gradient)) continue;
     const bool near = std::fabs(d) < kInlier_m;
-    const double facing = (c * p.normal_x - s * p.normal_y) * gradient.x() + (s * p.normal_x + c * p.normal_y) * gradient.y();
+    const double facing =
+        (c * p.normal_x - s * p.normal_y) * gradient.x() + (s * p.normal_x + c * p.normal_y) * gradient.y();
     if (near && facing > 0.3) {
       inliers += 1.0;
       squares += d * d;
@@ -207,19 +217,23 @@ Agreement agreement_of(const Submap& from, const Submap& to, const Pose2& T_from
 /// Map-axes Hessian of `from`'s frame to the edge's error, which lies in the axes of `to`.
 /// @param floor_m, floor_rad  standard deviations that no match undercuts
 Eigen::Matrix3d information_of(const Fit& fit, double floor_m, double floor_rad) {
-  // Neighbouring points share their noise: count one in three, each of 5 cm. A direction left open is known to 1 m.
+  // Neighbouring points share their noise: count one in three, each of 5 cm. A direction left open is known
+  // to 1 m.
   const double per_point = 1.0 / (3.0 * 0.05 * 0.05);
   const Eigen::Matrix3d weak = Eigen::Vector3d(1.0, 1.0, 30.0).asDiagonal();
   // A straight wall's contour waves by a few degrees, which looks like a hold along the wall: take that out.
   Eigen::Matrix3d hessian = fit.hessian;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(hessian.topLeftCorner<2, 2>());
-  const Eigen::Vector2d share = ((axes.eigenvalues().array() - kWaviness * fit.weight).max(0.0) /
-                                 axes.eigenvalues().array().max(1e-9)).sqrt();
+  const Eigen::Vector2d share =
+      ((axes.eigenvalues().array() - kWaviness * fit.weight).max(0.0) / axes.eigenvalues().array().max(1e-9))
+          .sqrt();
   Eigen::Matrix3d shrink = Eigen::Matrix3d::Identity();
   shrink.topLeftCorner<2, 2>() = axes.eigenvectors() * share.asDiagonal() * axes.eigenvectors().transpose();
   hessian = shrink * hessian * shrink;
   Eigen::Matrix3d covariance = (hessian * per_point + weak).inverse();
-  covariance += Eigen::Vector3d(floor_m * floor_m, floor_m * floor_m, floor_rad * floor_rad).asDiagonal().toDenseMatrix();
+  covariance += Eigen::Vector3d(floor_m * floor_m, floor_m * floor_m, floor_rad * floor_rad)
+                    .asDiagonal()
+                    .toDenseMatrix();
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   const double c = std::cos(fit.pose.yaw_rad), s = std::sin(fit.pose.yaw_rad);
   R.topLeftCorner<2, 2>() << c, -s, s, c;
@@ -252,8 +266,8 @@ void judge(const MatchConfig& config, const Submap& from, const Submap& to, Matc
 
 }  // namespace
 
-MatchResult match_submaps(const MatchConfig& config, const Submap& from, const Submap& to, const Pose2& T_from_to,
-                          const MatchWindow& window) {
+MatchResult match_submaps(const MatchConfig& config, const Submap& from, const Submap& to,
+                          const Pose2& T_from_to, const MatchWindow& window) {
   MatchResult result;
   result.T_from_to = T_from_to;
   if (from.empty() || to.empty()) {
@@ -261,7 +275,8 @@ MatchResult match_submaps(const MatchConfig& config, const Submap& from, const S
     return result;
   }
   std::vector<Fit> fits;
-  for (const Candidate& peak : search(config, from, to, T_from_to, window)) fits.push_back(refine(from, to, peak.pose));
+  for (const Candidate& peak : search(config, from, to, T_from_to, window))
+    fits.push_back(refine(from, to, peak.pose));
   std::stable_sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.score > b.score; });
   if (fits.empty() || fits.front().score <= 0.0) {
     result.reason = "no alignment found";
@@ -282,7 +297,8 @@ MatchResult match_submaps(const MatchConfig& config, const Submap& from, const S
   return result;
 }
 
-MatchResult align_submaps(const MatchConfig& config, const Submap& from, const Submap& to, const Pose2& T_from_to) {
+MatchResult align_submaps(const MatchConfig& config, const Submap& from, const Submap& to,
+                          const Pose2& T_from_to) {
   MatchResult result;
   result.T_from_to = T_from_to;
   if (from.empty() || to.empty()) {

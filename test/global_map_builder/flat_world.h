@@ -23,8 +23,8 @@ inline void add_box(double low_x, double low_y, double high_x, double high_y, st
   walls->push_back({{low_x, high_y}, {low_x, low_y}});
 }
 
-/// A ring of corridors, 3 m wide, round a block of 8 x 4 m, with cupboards of different sizes: no place looks like
-/// another. The drive starts at (0, 0).
+/// A ring of corridors, 3 m wide, round a block of 8 x 4 m, with cupboards of different sizes: no place looks
+/// like another. The drive starts at (0, 0).
 inline std::vector<Wall> ring() {
   std::vector<Wall> walls;
   add_box(-1.5, -1.5, 12.5, 8.5, &walls);
@@ -99,7 +99,8 @@ inline std::vector<Pose2> drive_through(const std::vector<Point2>& points) {
     const double length = std::hypot(points[i].x_m - from.x_m, points[i].y_m - from.y_m);
     const int steps = static_cast<int>(std::ceil(length / (0.5 * kPeriod_s)));
     for (int k = 1; k <= steps; ++k) {
-      poses.push_back({from.x_m + length * k / steps * std::cos(yaw), from.y_m + length * k / steps * std::sin(yaw), yaw});
+      poses.push_back({from.x_m + length * k / steps * std::cos(yaw),
+                       from.y_m + length * k / steps * std::sin(yaw), yaw});
     }
   }
   return poses;

@@ -21,7 +21,8 @@ void expect_as_brute_force(const GridGeometry& g, const Contour& contour, float 
   const std::vector<float> distance = contour_distance_m(g, contour);
   for (int iy = 0; iy < g.height_cells; ++iy) {
     for (int ix = 0; ix < g.width_cells; ++ix) {
-      ASSERT_NEAR(distance[g.index(ix, iy)], brute_force(contour, g.center_x_m(ix), g.center_y_m(iy)), tolerance_m)
+      ASSERT_NEAR(distance[g.index(ix, iy)], brute_force(contour, g.center_x_m(ix), g.center_y_m(iy)),
+                  tolerance_m)
           << ix << " " << iy;
     }
   }
@@ -30,9 +31,9 @@ void expect_as_brute_force(const GridGeometry& g, const Contour& contour, float 
 TEST(ContourDistance, OfOneSegmentIsWorkedOutByHand) {
   const GridGeometry g{4, 3, 1.0, 0.0, 0.0};
   const std::vector<float> d = contour_distance_m(g, {{{1.25, 1.5}, {1.75, 1.5}}});
-  EXPECT_FLOAT_EQ(d[g.index(1, 1)], 0.0f);                     // centre (1.5, 1.5) lies on it
+  EXPECT_FLOAT_EQ(d[g.index(1, 1)], 0.0f);  // centre (1.5, 1.5) lies on it
   EXPECT_FLOAT_EQ(d[g.index(1, 2)], 1.0f);
-  EXPECT_FLOAT_EQ(d[g.index(0, 1)], 0.75f);                    // from (0.5, 1.5) to its end
+  EXPECT_FLOAT_EQ(d[g.index(0, 1)], 0.75f);  // from (0.5, 1.5) to its end
   EXPECT_FLOAT_EQ(d[g.index(3, 0)], std::hypot(1.75f, 1.0f));
 }
 
@@ -59,7 +60,8 @@ TEST(ContourDistance, AgreesWithBruteForceOnTheZeroLevelOfACircle) {
   std::vector<float> value(g.cell_count());
   for (int iy = 0; iy < 60; ++iy) {
     for (int ix = 0; ix < 60; ++ix) {
-      value[g.index(ix, iy)] = static_cast<float>(1.013 - std::hypot(g.center_x_m(ix) - 1.52, g.center_y_m(iy) - 1.47));
+      value[g.index(ix, iy)] =
+          static_cast<float>(1.013 - std::hypot(g.center_x_m(ix) - 1.52, g.center_y_m(iy) - 1.47));
     }
   }
   const Contour contour = extract_zero_level(g, value);
@@ -68,8 +70,10 @@ TEST(ContourDistance, AgreesWithBruteForceOnTheZeroLevelOfACircle) {
   for (std::size_t i = 0; i < value.size(); ++i) EXPECT_NEAR(distance[i], std::fabs(value[i]), 0.002f);
 }
 
-/// A pinhole frame of the world y < wall_y: the camera at (x, 0) looks along +y or, from the other side, along -y.
-TsdfObservation frame_of_wall(double x_m, double y_m, double yaw_rad, double wall_y_m, const ObservationLimits& limits) {
+/// A pinhole frame of the world y < wall_y: the camera at (x, 0) looks along +y or, from the other side,
+/// along -y.
+TsdfObservation frame_of_wall(double x_m, double y_m, double yaw_rad, double wall_y_m,
+                              const ObservationLimits& limits) {
   DepthProfile profile;
   profile.stamp_s = 1.0;
   profile.fx_px = 100.0;
@@ -113,8 +117,8 @@ TEST(ContourDistance, KeepsBothSidesOfATenCentimetreWall) {
   EXPECT_LT(low_error, 0.02);
   EXPECT_LT(high_error, 0.02);
   const std::vector<float> distance = contour_distance_m(g, contour);
-  EXPECT_NEAR(distance[g.index(40, 30)], 2.0 - g.center_y_m(30), 0.02);   // 0.475 m before it
-  EXPECT_NEAR(distance[g.index(40, 52)], g.center_y_m(52) - 2.1, 0.02);   // on the other side
+  EXPECT_NEAR(distance[g.index(40, 30)], 2.0 - g.center_y_m(30), 0.02);  // 0.475 m before it
+  EXPECT_NEAR(distance[g.index(40, 52)], g.center_y_m(52) - 2.1, 0.02);  // on the other side
 }
 
 TEST(ContourDistance, AgreesWithThePapersRayTracingInTheOpen) {
@@ -135,7 +139,8 @@ TEST(ContourDistance, AgreesWithThePapersRayTracingInTheOpen) {
   for (std::size_t i = 0; i < value.size(); ++i) {
     if (!(value[i] > 0.0f)) continue;
     ++compared;
-    // The rays read F bilinearly, which rounds a corner where the contour cuts it straight: 8 mm at the pillar's.
+    // The rays read F bilinearly, which rounds a corner where the contour cuts it straight: 8 mm at the
+    // pillar's.
     EXPECT_NEAR(exact[i], traced[i], 0.009f);
   }
   EXPECT_GT(compared, 1200);

@@ -66,14 +66,15 @@ double contour_rmse_m(const Drive& drive, const Contour& contour) {
   return std::sqrt(squares / static_cast<double>(points.size()));
 }
 
-/// The share of the walls in view that have contour within 10 cm: the long sides and one end of the block in the middle,
-/// but for what the camera's 57 degrees never saw.
+/// The share of the walls in view that have contour within 10 cm: the long sides and one end of the block in
+/// the middle, but for what the camera's 57 degrees never saw.
 double completeness(const Contour& contour) {
   const std::vector<Point2> points = sample_contour(contour, 0.05);
   double found = 0.0, all = 0.0;
   const auto look = [&](double x, double y) {
     all += 1.0;
-    found += std::any_of(points.begin(), points.end(), [&](const Point2& p) { return std::hypot(p.x_m - x, p.y_m - y) < 0.1; });
+    found += std::any_of(points.begin(), points.end(),
+                         [&](const Point2& p) { return std::hypot(p.x_m - x, p.y_m - y) < 0.1; });
   };
   for (double x = 3.0; x < 6.8; x += 0.1) look(x, 1.5);
   for (double x = 0.0; x < 2.9; x += 0.1) look(x, -1.5);
@@ -83,7 +84,8 @@ double completeness(const Contour& contour) {
 }
 
 double wheel_error_m(const Drive& drive) {
-  return distance_m(drive.odometry.front().inverse() * drive.odometry.back(), drive.truth.front().inverse() * drive.truth.back());
+  return distance_m(drive.odometry.front().inverse() * drive.odometry.back(),
+                    drive.truth.front().inverse() * drive.truth.back());
 }
 
 TEST(MapBuilder, ClosesALoopOfDriftingOdometryByItself) {
@@ -92,17 +94,21 @@ TEST(MapBuilder, ClosesALoopOfDriftingOdometryByItself) {
   MapBuilder builder(only(true, false), small_mapper());
   feed(drive, {}, &builder);
   const BuiltMap built = builder.build();
-  const auto accepted = std::count_if(built.closures.begin(), built.closures.end(), [](const Closure& c) { return c.accepted; });
+  const auto accepted = std::count_if(built.closures.begin(), built.closures.end(),
+                                      [](const Closure& c) { return c.accepted; });
   EXPECT_GE(accepted, 1);
   EXPECT_LT(final_error_m(drive, built), 0.15);
   EXPECT_LT(contour_rmse_m(drive, built.contour), 0.06);
   EXPECT_GT(completeness(built.contour), 0.9);
   EXPECT_EQ(built.map.trajectory.size(), drive.truth.size());
-  EXPECT_NEAR(distance_m(built.map.trajectory.front().T_map_robot, Pose2{}), 0.0, 1e-9) << "the start is the origin";
+  EXPECT_NEAR(distance_m(built.map.trajectory.front().T_map_robot, Pose2{}), 0.0, 1e-9)
+      << "the start is the origin";
 
   // Values of the grids, at places known to be open, a wall and never seen.
   const GridGeometry& g = built.map.occupancy.geometry;
-  const auto occupancy = [&](double x, double y) { return built.map.occupancy.value[g.index(g.cell_x(x), g.cell_y(y))]; };
+  const auto occupancy = [&](double x, double y) {
+    return built.map.occupancy.value[g.index(g.cell_x(x), g.cell_y(y))];
+  };
   EXPECT_EQ(occupancy(5.0, 0.2), 0);
   EXPECT_EQ(occupancy(5.5, 3.5), -1) << "inside the block nothing was seen; unknown is not free";
   EXPECT_TRUE(std::isnan(built.map.distance.nearest(5.5, 3.5)));
@@ -191,8 +197,8 @@ TEST(SubmapMatcher, FindsTheTransformFromAPoorGuess) {
 
 TEST(SubmapMatcher, RefusesTwoDifferentPlaces) {
   const std::vector<Wall> walls = ring();
-  const MatchResult match = match_submaps({}, submap_at(walls, {0.0, 0.0, 0.0}), submap_at(walls, {11.0, 3.5, 0.0}),
-                                          {0.3, 0.2, 0.0}, {2.5, 0.5});
+  const MatchResult match = match_submaps({}, submap_at(walls, {0.0, 0.0, 0.0}),
+                                          submap_at(walls, {11.0, 3.5, 0.0}), {0.3, 0.2, 0.0}, {2.5, 0.5});
   EXPECT_FALSE(match.accepted);
   EXPECT_FALSE(match.reason.empty());
 }
@@ -200,8 +206,8 @@ TEST(SubmapMatcher, RefusesTwoDifferentPlaces) {
 TEST(SubmapMatcher, AnOpenCorridorLeavesItsDirectionOpen) {
   std::vector<Wall> walls;
   add_box(-50.0, -1.0, 50.0, 1.0, &walls);
-  const MatchResult match = match_submaps({}, submap_at(walls, {0.0, 0.0, 0.0}), submap_at(walls, {0.6, 0.0, 0.0}),
-                                          {0.5, 0.1, 0.02}, {1.5, 0.2});
+  const MatchResult match = match_submaps({}, submap_at(walls, {0.0, 0.0, 0.0}),
+                                          submap_at(walls, {0.6, 0.0, 0.0}), {0.5, 0.1, 0.02}, {1.5, 0.2});
   EXPECT_GT(match.information(1, 1), 30.0 * match.information(0, 0)) << "across is known, along is not";
   EXPECT_NEAR(match.T_from_to.y_m, 0.0, 0.03);
 }

@@ -62,7 +62,9 @@ TEST_F(MapFiles, MapServerPixelsAreReadAsMapServerDoes) {
   std::string pgm = "P5\n# made by hand\n4 2\n255\n";
   for (const int p : {0, 254, 205, 128, 255, 100, 89, 206}) pgm += static_cast<char>(p);
   write("a.pgm", pgm);
-  write("a.yaml", "image: a.pgm\nresolution: 0.1\norigin: [-1, 2, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n");
+  write("a.yaml",
+        "image: a.pgm\nresolution: 0.1\norigin: [-1, 2, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: "
+        "0.196\n");
   const MapDirectory map = load_map(path("a.yaml"));
   const GridGeometry& g = map.occupancy.geometry;
   EXPECT_EQ(g.width_cells, 4);
@@ -77,13 +79,16 @@ TEST_F(MapFiles, ScaleRawAndNegateFollowMapServer) {
   for (const int p : {0, 128, 255}) pgm += static_cast<char>(p);
   write("a.pgm", pgm);
   const auto read = [&](const std::string& more) {
-    write("a.yaml", "image: a.pgm\nresolution: 0.1\norigin: [0, 0, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n" + more);
+    write("a.yaml",
+          "image: a.pgm\nresolution: 0.1\norigin: [0, 0, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n" +
+              more);
     return load_map(path("a.yaml")).occupancy.value;
   };
   // 128: occ = 0.49804, (0.49804 - 0.196) / 0.454 = 0.66529, 1 + 98 x 0.66529 = 66.2
   EXPECT_EQ(read("negate: 0\nmode: scale\n"), (std::vector<std::int8_t>{100, 66, 0}));
   EXPECT_EQ(read("negate: 1\nmode: trinary\n"), (std::vector<std::int8_t>{0, -1, 100}));
-  EXPECT_EQ(read("negate: 0\nmode: raw\n"), (std::vector<std::int8_t>{0, -1, -1}));  // 255 is -1 as a signed byte
+  EXPECT_EQ(read("negate: 0\nmode: raw\n"),
+            (std::vector<std::int8_t>{0, -1, -1}));  // 255 is -1 as a signed byte
 }
 
 TEST_F(MapFiles, ReadBackExactly) {
@@ -115,13 +120,15 @@ TEST_F(MapFiles, ASavedMapIsReplacedWholeAndNothingElseIsTouched) {
   save_map(path("m/"), map);  // a trailing slash changes nothing
   EXPECT_EQ(load_map(path("m")).occupancy.value[0], 100);
 
-  EXPECT_NE(fault([&] { save_map(folder_.string(), map); }).find("something other than a map"), std::string::npos);
+  EXPECT_NE(fault([&] { save_map(folder_.string(), map); }).find("something other than a map"),
+            std::string::npos);
   EXPECT_TRUE(is_map_directory(path("m")));
   const auto failing = [](const std::string&) { throw UserError("the disk is full"); };
   map.occupancy.value[0] = 0;
   EXPECT_EQ(fault([&] { save_map(path("m"), map, false, failing); }), "the disk is full");
   EXPECT_EQ(load_map(path("m")).occupancy.value[0], 100) << "the old map must survive a failed save";
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1) << "no half-written directory";
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1)
+      << "no half-written directory";
 }
 
 TEST_F(MapFiles, HandDrawnKeepoutIsNotOverwrittenSilently) {

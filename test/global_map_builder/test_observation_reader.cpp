@@ -94,9 +94,11 @@ class Recording : public ::testing::Test {
     }
     return "";
   }
-  /// Runs build_map on a file; gives its standard error, checks exit code 1, one line and that nothing was written.
+  /// Runs build_map on a file; gives its standard error, checks exit code 1, one line and that nothing was
+  /// written.
   std::string refusal_of_build_map(const std::string& bag, const std::string& more = "") const {
-    const std::string command = std::string(BUILD_MAP) + " " + bag + " --out " + path("map") + " " + more + " 2> " + path("err");
+    const std::string command =
+        std::string(BUILD_MAP) + " " + bag + " --out " + path("map") + " " + more + " 2> " + path("err");
     const int status = std::system(command.c_str());
     EXPECT_EQ(WEXITSTATUS(status), 1) << command;
     EXPECT_FALSE(fs::exists(path("map"))) << "nothing half-written";
@@ -170,7 +172,8 @@ TEST_F(Recording, AMissingMountIsToldAndAnUpsideDownScannerIsTurned) {
   {
     ObservationReader reader(path(), {}, front_end());
     ASSERT_EQ(reader.warnings().size(), 1u);
-    EXPECT_NE(reader.warnings()[0].find("no transform from 'base_link' to the sensor's frame 'laser'"), std::string::npos);
+    EXPECT_NE(reader.warnings()[0].find("no transform from 'base_link' to the sensor's frame 'laser'"),
+              std::string::npos);
   }
   write([](rosbag::Bag& bag) {
     fill_drive(bag);
@@ -216,9 +219,11 @@ TEST_F(Recording, BuildMapRefusesInOneSentenceAndWritesNothing) {
   EXPECT_NE(refusal_of_build_map(path()).find("odom"), std::string::npos);
   write(fill_drive);
   EXPECT_NE(refusal_of_build_map(path(), "--from profile").find("depth_profile"), std::string::npos);
-  EXPECT_NE(refusal_of_build_map(path(), "--config " + path("none.yaml")).find("none.yaml"), std::string::npos);
+  EXPECT_NE(refusal_of_build_map(path(), "--config " + path("none.yaml")).find("none.yaml"),
+            std::string::npos);
   std::ofstream(path("bad.yaml")) << "map_builder: {surface: {resolutoin_m: 0.1}}\n";
-  EXPECT_NE(refusal_of_build_map(path(), "--config " + path("bad.yaml")).find("resolutoin_m"), std::string::npos);
+  EXPECT_NE(refusal_of_build_map(path(), "--config " + path("bad.yaml")).find("resolutoin_m"),
+            std::string::npos);
 
   // Cut off: the index at its end is gone.
   write(fill_drive);

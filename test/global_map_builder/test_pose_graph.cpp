@@ -77,7 +77,9 @@ TEST(PoseGraph, FalseClosuresFadeOut) {
     PoseGraph graph = truth;
     RandomStream random(5, random_stream::kTest, 0, 0);
     for (PoseGraphEdge& e : graph.edges) {  // a sane odometry: 1 cm, 0.3 deg a metre
-      if (!e.robust) e.T_from_to = e.T_from_to * Pose2{random.normal(0, 0.01), random.normal(0, 0.01), random.normal(0, 0.005)};
+      if (!e.robust)
+        e.T_from_to =
+            e.T_from_to * Pose2{random.normal(0, 0.01), random.normal(0, 0.01), random.normal(0, 0.005)};
     }
     graph.edges.push_back(edge(15, 35, {0.0, 0.0, 0.0}, true));  // 10 m apart in truth
     graph.edges.push_back(edge(3, 22, {0.5, 0.0, kPi}, true));
@@ -87,7 +89,8 @@ TEST(PoseGraph, FalseClosuresFadeOut) {
     EXPECT_LT(largest_distance_m(truth, graph), 0.5) << loss;
     config.robust_loss = "none";
     optimize(config, &graph);
-    EXPECT_GT(largest_distance_m(truth, graph), 1.0) << "the false closures bend the map when nothing guards it";
+    EXPECT_GT(largest_distance_m(truth, graph), 1.0)
+        << "the false closures bend the map when nothing guards it";
   }
 }
 
@@ -109,7 +112,8 @@ TEST(PoseGraph, FilesReadBackAndTellTheLineOfAFault) {
     }
     return std::string();
   };
-  EXPECT_NE(fault_of("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 1 1 0 nan 1 0 0 1 0 1\n").find("line 2"), std::string::npos);
+  EXPECT_NE(fault_of("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 1 1 0 nan 1 0 0 1 0 1\n").find("line 2"),
+            std::string::npos);
   EXPECT_NE(fault_of("EDGE_SE2 0 1 1 0 0 1 0 0 -1 0 1\n").find("positive definite"), std::string::npos);
   EXPECT_NE(fault_of("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n").find("not known"), std::string::npos);
   EXPECT_NE(fault_of("").find("no edges"), std::string::npos);
