@@ -79,6 +79,7 @@ struct PlannerTracker::State {
   double missing_since_s = -1.0;
   double blocked_since_s = -1.0;
   Point2 blocked_at;
+  double looking_since_s = -1.0;  ///< standing before a closed way
   int avoidances = 0;
   double lost_since_s = -1.0, found_since_s = -1.0, turned_rad = 0.0, last_yaw_rad = 0.0;
   bool lost_turn_done = false;

@@ -12,6 +12,7 @@ namespace {
 constexpr double kFoundFor_s = 0.5;        ///< localized for this long ends the recovery
 constexpr double kFailedPlanWait_s = 1.0;  ///< a search that finds nothing is the dearest
 constexpr double kReplanOnEnd_m = 0.15;
+constexpr double kFloorSeenFrom_m = 1.5;  ///< a level Kinect at 0.5 m sees the floor from 1.3 m on
 
 Point2 position(const Pose2& pose) { return {pose.x_m, pose.y_m}; }
 
@@ -243,12 +244,19 @@ bool PlannerTracker::State::avoiding(double now_s, const RobotState& robot) {
     const bool oscillating = config.oscillation_timeout > 0.0 && dithering > config.oscillation_timeout;
     const bool stuck = outcome == PlanKeeper::Outcome::kStartBlocked &&
                        watch.without_progress_s(now_s) > config.planning.controller_patience;
-    if (!waited && !oscillating && !stuck) return false;
-    blocked_since_s = -1.0;
+    // What closes the way may have gone: it stands too near for its floor to be seen, so nothing can clear it
+    // here.
+    const bool blind = looking_since_s >= 0.0 &&
+                       now_s - looking_since_s > 2.0 * config.planning.controller_patience &&
+                       std::hypot(keeper.at().x_m - robot.T_map_base.x_m,
+                                  keeper.at().y_m - robot.T_map_base.y_m) < kFloorSeenFrom_m;
+    if (!waited && !oscillating && !stuck && !blind) return false;
+    blocked_since_s = looking_since_s = -1.0;
     watch.dithering_s(now_s, robot.T_odom_base, false, 0.0);
     ++avoidances;
-    moves.start(2);
+    moves.start(blind ? 4 : 2);
     explanation = waited        ? "Something stays in the way; trying random moves towards open space."
+                  : blind       ? "The way is closed right here; stepping back to look again."
                   : oscillating ? "Driving without getting on; trying random moves towards open space."
                                 : "No way out of this place; trying random moves towards open space.";
     tracker.reset();
@@ -274,11 +282,13 @@ void PlannerTracker::State::drive(double now_s, const RobotState& robot) {
   const double remaining = path.remaining_m() + path.offset_m();
   if (!to_goal && remaining < kReplanOnEnd_m) {
     // Arrived where it is closed: looks at it.
+    if (looking_since_s < 0.0) looking_since_s = now_s;
     const Point2 p = robot.T_map_base.inverse() * keeper.at();
     const double bearing = std::atan2(p.y_m, p.x_m);
     act(Activity::kWaiting, std::abs(bearing) > 0.2 ? tracker.turn(input, bearing) : tracker.stop(input));
     return;
   }
+  looking_since_s = -1.0;
   if (to_goal && config.min_vel_x < 0.0 && remaining < 0.3) {
     // A goal just overshot, straight behind: back up over what was just driven, if it is still seen free.
     const Point2 p = robot.T_map_base.inverse() * position(goal);

@@ -371,8 +371,11 @@ def processor():
 
 
 def commit():
-    result = subprocess.run(["git", "-C", str(ROOT), "describe", "--always", "--dirty"], capture_output=True, text=True,
-                            check=False)
+    try:
+        result = subprocess.run(["git", "-C", str(ROOT), "describe", "--always", "--dirty"], capture_output=True, text=True,
+                                check=False)
+    except FileNotFoundError:  # a machine without git
+        return "unknown"
     return result.stdout.strip() or "unknown"
 
 
