@@ -33,8 +33,9 @@ void reading_costs(const Window& window, float x0, float y0, float c, float s, c
     const int ix = static_cast<int>(gx), iy = static_cast<int>(gy);  // not negative: truncation is floor
     const float tx = gx - static_cast<float>(ix), ty = gy - static_cast<float>(iy);
     const int index = (((iy + first_y) & mask) << bits) | ((ix + first_x) & mask);
-    const auto quad = static_cast<std::int32_t>(quads[index]);
-    const int a = (quad << 24) >> 24, b = (quad << 16) >> 24, d = (quad << 8) >> 24, e = quad >> 24;
+    const std::uint32_t quad = quads[index];  // unsigned to shift left, signed to shift back with the sign
+    const int a = static_cast<std::int32_t>(quad << 24) >> 24, b = static_cast<std::int32_t>(quad << 16) >> 24;
+    const int d = static_cast<std::int32_t>(quad << 8) >> 24, e = static_cast<std::int32_t>(quad) >> 24;
     const float share_a = a == -128 ? 0.0f : (1.0f - tx) * (1.0f - ty);
     const float share_b = b == -128 ? 0.0f : tx * (1.0f - ty);
     const float share_d = d == -128 ? 0.0f : (1.0f - tx) * ty;
