@@ -101,7 +101,7 @@ struct ClosureConfig {
 /// Finding and mending the mapper's jumps, with edges between keyframes a few metres apart by direct
 /// alignment.
 struct RefinementConfig {
-  bool enabled = true;
+  bool enabled = false;
   double half_length_m = 0.5;
   double range_max_m = 8.0;
   std::vector<double> spans_m = {1.5, 3.0, 6.0};
