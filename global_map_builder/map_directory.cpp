@@ -10,9 +10,9 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/config.h"
-#include "core/distance_transform.h"
 #include "core/error.h"
 #include "core/file_io.h"
+#include "core/occupancy_distance.h"
 #include "global_map_builder/directory_swap.h"
 #include "global_map_builder/map_image.h"
 
@@ -194,28 +194,6 @@ std::string map_checksum(const OccupancyGrid& occupancy, const DistanceMap& dist
     hash.add(&value, sizeof value);
   }
   return hash.text();
-}
-
-DistanceMap distance_from_occupancy(const OccupancyGrid& occupancy) {
-  const GridGeometry& geometry = occupancy.geometry;
-  std::vector<std::uint8_t> wall(geometry.cell_count()), open(geometry.cell_count());
-  for (std::size_t i = 0; i < wall.size(); ++i) {
-    wall[i] = occupancy.value[i] >= 50;
-    open[i] = !wall[i];
-  }
-  const std::vector<float> to_wall = euclidean_distance_m(geometry, wall);
-  const std::vector<float> to_open = euclidean_distance_m(geometry, open);
-  const auto half = static_cast<float>(geometry.resolution_m / 2.0);
-  DistanceMap map;
-  map.geometry = geometry;
-  map.distance_m.resize(geometry.cell_count());
-  for (std::size_t i = 0; i < wall.size(); ++i) {
-    // A cell's surface lies half a cell before its centre.
-    map.distance_m[i] = wall[i]                  ? half - to_open[i]
-                        : occupancy.value[i] < 0 ? std::numeric_limits<float>::quiet_NaN()
-                                                 : to_wall[i] - half;
-  }
-  return map;
 }
 
 MapDirectory load_map(const std::string& path) {

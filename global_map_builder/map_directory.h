@@ -44,10 +44,6 @@ std::string save_map(const std::string& directory, const MapDirectory& map, bool
 /// The checksum load_map and save_map give.
 std::string map_checksum(const OccupancyGrid& occupancy, const DistanceMap& distance);
 
-/// Distance [m] to the surface of the nearest occupied cell (its outer edge): positive in free cells,
-/// negative in occupied cells, NaN in unknown ones. For maps that carry no contour.
-DistanceMap distance_from_occupancy(const OccupancyGrid& occupancy);
-
 /// True if `path` is a map directory (has a map.yaml).
 bool is_map_directory(const std::string& path);
 

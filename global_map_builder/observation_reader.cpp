@@ -20,6 +20,7 @@
 #include "core/pose_buffer.h"
 #include "depth_profile_nodelet/front_end.h"
 #include "global_map_builder/bag_transforms.h"
+#include "kinect_calib/depth_messages.h"
 #include "ros_common/bag_reader.h"
 #include "ros_common/conversions.h"
 
@@ -48,18 +49,6 @@ void flip(RangeScan* scan) {
   scan->angle_min_rad = -last;
   std::reverse(scan->range_m.begin(), scan->range_m.end());
   std::reverse(scan->evidence.begin(), scan->evidence.end());
-}
-
-RawCamera raw_camera(const sensor_msgs::CameraInfo& info) {
-  RawCamera camera;
-  camera.rectified = pinhole_from(info);
-  camera.raw = camera.rectified;
-  camera.raw.fx_px = info.K[0];
-  camera.raw.fy_px = info.K[4];
-  camera.raw.cx_px = info.K[2];
-  camera.raw.cy_px = info.K[5];
-  camera.distortion.assign(info.D.begin(), info.D.end());
-  return camera;
 }
 
 }  // namespace
@@ -220,7 +209,7 @@ class ObservationReader::Impl {
     const std::string topic = topic_or_only(config_.camera_info_topic, "sensor_msgs/CameraInfo");
     if (topic.empty()) bag_.require_topic(config_.camera_info_topic);
     search({topic}, [&](const rosbag::MessageInstance& message) {
-      camera_ = raw_camera(*instantiate<sensor_msgs::CameraInfo>(message));
+      camera_ = raw_camera_from(*instantiate<sensor_msgs::CameraInfo>(message));
       throw Found{};
     });
     if (!camera_.raw.valid() || !camera_.rectified.valid()) {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/occupancy_distance.h"
 #include "global_map_builder/map_directory.h"
 #include "ros_common/command_line.h"
 #include "ros_common/conversions.h"

@@ -9,6 +9,7 @@
 #include <pluginlib/class_list_macros.hpp>
 
 #include "core/error.h"
+#include "core/occupancy_distance.h"
 #include "ros_common/conversions.h"
 #include "ros_common/parameters.h"
 #include "tsdf_localizer/map_fields.h"
@@ -85,7 +86,7 @@ void LocalizerNodelet::on_distance_map(const kinect_nav::DistanceMapConstPtr& me
 void LocalizerNodelet::on_map(const nav_msgs::OccupancyGridConstPtr& message) {
   if (has_distance_map_) return;  // the better one of the same map server
   try {
-    const DistanceMap map = distance_map_from_occupancy(occupancy_from(*message));
+    const DistanceMap map = distance_from_occupancy(occupancy_from(*message));
     if (localizer_->has_map() && checksum_of(map) == checksum_) return;
     take_map(map, map_sub_.getTopic());
   } catch (const UserError& error) {
@@ -171,7 +172,7 @@ void LocalizerNodelet::on_initial_pose(const geometry_msgs::PoseWithCovarianceSt
 
 bool LocalizerNodelet::on_set_map(nav_msgs::SetMap::Request& request, nav_msgs::SetMap::Response& response) {
   try {
-    response.success = take_map(distance_map_from_occupancy(occupancy_from(request.map)), "set_map") &&
+    response.success = take_map(distance_from_occupancy(occupancy_from(request.map)), "set_map") &&
                        take_pose(request.initial_pose, "set_map");
     has_distance_map_ = true;  // as amcl: what set_map gave is not replaced by the topic's map
   } catch (const UserError& error) {

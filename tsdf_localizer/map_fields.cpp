@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/distance_transform.h"
 #include "core/error.h"
 
 namespace knav {
@@ -75,31 +74,6 @@ MapFields make_map_fields(const DistanceMap& map, const MeasurementConfig& measu
   }
   return {map, fine_field(map, measurement), coarse_field(map, search.truncation_m, measurement.unknown_cost),
           free_positions(map, search)};
-}
-
-DistanceMap distance_map_from_occupancy(const OccupancyGrid& grid) {
-  constexpr int kOccupiedFrom = 65, kFreeTo = 25;
-  if (grid.value.size() != grid.geometry.cell_count()) {
-    throw UserError("map: the number of its values is not width x height; build or load another one.");
-  }
-  std::vector<std::uint8_t> occupied(grid.value.size()), open(grid.value.size());
-  for (std::size_t i = 0; i < grid.value.size(); ++i) {
-    occupied[i] = grid.value[i] >= kOccupiedFrom;
-    open[i] = !occupied[i];
-  }
-  const std::vector<float> to_wall = euclidean_distance_m(grid.geometry, occupied);
-  const std::vector<float> to_open = euclidean_distance_m(grid.geometry, open);
-  DistanceMap map;
-  map.geometry = grid.geometry;
-  map.distance_m.resize(grid.value.size());
-  const auto half_cell = static_cast<float>(grid.geometry.resolution_m / 2.0);
-  for (std::size_t i = 0; i < grid.value.size(); ++i) {
-    const int value = grid.value[i];
-    map.distance_m[i] = occupied[i]                      ? half_cell - to_open[i]
-                        : value >= 0 && value <= kFreeTo ? to_wall[i] - half_cell
-                                                         : std::numeric_limits<float>::quiet_NaN();
-  }
-  return map;
 }
 
 }  // namespace knav

@@ -23,9 +23,4 @@ struct MapFields {
 MapFields make_map_fields(const DistanceMap& map, const MeasurementConfig& measurement,
                           const GlobalSearchConfig& search);
 
-/// A signed distance map from a plain occupancy grid (map_server's): occupied from 65 up, free to 25, else
-/// unknown, as map_server's default thresholds. The wall's surface lies half a cell before the centre of an
-/// occupied cell.
-DistanceMap distance_map_from_occupancy(const OccupancyGrid& grid);
-
 }  // namespace knav

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/file_io.h"
+#include "core/occupancy_distance.h"
 #include "global_map_builder/map_directory.h"
 #include "global_map_builder/map_image.h"
 

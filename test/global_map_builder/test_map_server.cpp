@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "core/occupancy_distance.h"
 #include "global_map_builder/map_directory.h"
 #include "ros_common/conversions.h"
 

@@ -3,6 +3,7 @@
 a wall with a reason."""
 import math
 import sys
+import time
 import unittest
 
 import actionlib
@@ -12,6 +13,7 @@ from actionlib_msgs.msg import GoalStatus
 from kinect_nav.msg import LocalizationStatus, NavigationFailure
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import UInt32
 
@@ -28,14 +30,18 @@ def goal_at(x, y, yaw):
 class DriveToGoal(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
+        # ROS time reads 0 until the first /clock comes, then leaps: waits begun before would end at the leap.
+        rospy.wait_for_message("/clock", Clock, 40)
+        while rospy.Time.now().is_zero():
+            time.sleep(0.01)
         cls.collisions = 0
         cls.failures = []
         rospy.Subscriber("collisions", UInt32, lambda m: setattr(cls, "collisions", m.data))
         rospy.Subscriber("navigation_failure", NavigationFailure, cls.failures.append)
         cls.client = actionlib.SimpleActionClient("move_base", MoveBaseAction)
         assert cls.client.wait_for_server(rospy.Duration(40)), "no move_base action server"
-        deadline = rospy.Time.now() + rospy.Duration(40)
-        while rospy.Time.now() < deadline:
+        deadline_s = time.monotonic() + 40
+        while time.monotonic() < deadline_s:
             if rospy.wait_for_message("localization_status", LocalizationStatus, 40).status == LocalizationStatus.OK:
                 return
         raise AssertionError("the localizer did not become ok")
