@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -15,12 +16,19 @@ constexpr double kOdometryPeriod_s = 0.02;
 constexpr double kControlPeriod_s = 0.05;
 constexpr double kTrackPeriod_s = 0.1;
 
-/// What the benchmark allows for a leg: an honest pace of 0.2 m/s along a way twice the straight one, and a minute.
+/// What the benchmark allows for a leg: an honest pace of 0.2 m/s along a way twice the straight one, and a
+/// minute.
 double time_limit_s(double straight_m) { return 60.0 + 2.0 * straight_m / 0.2; }
 
 Pose2 planar_camera(const Eigen::Isometry3d& T_base_optical) {
   const Eigen::Vector3d forward = T_base_optical.rotation().col(2);
-  return {T_base_optical.translation().x(), T_base_optical.translation().y(), std::atan2(forward.y(), forward.x())};
+  return {T_base_optical.translation().x(), T_base_optical.translation().y(),
+          std::atan2(forward.y(), forward.x())};
+}
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 /// True once per period of simulated time.
@@ -38,33 +46,12 @@ class Ticker {
   double next_s_ = 0.0;
 };
 
-void score(BenchmarkResult* result) {
-  double sum = 0.0, squares = 0.0;
-  int reached = 0;
-  for (const Leg& leg : result->legs) {
-    if (!leg.reached) {
-      ++result->failures;
-      continue;
-    }
-    ++reached;
-    sum += leg.positioning_error_m;
-    squares += leg.positioning_error_m * leg.positioning_error_m;
-  }
-  if (reached > 0) {
-    result->positioning_error_mean_m = sum / reached;
-    result->positioning_error_sd_m =
-        std::sqrt(std::max(0.0, squares / reached - std::pow(result->positioning_error_mean_m, 2)));
-  }
-  result->average_speed_mps = result->time_s > 0.0 ? result->distance_m / result->time_s : 0.0;
-  result->mean_time_to_failure_s = result->time_s / std::max(1, result->failures);
-  result->mean_distance_to_failure_m = result->distance_m / std::max(1, result->failures);
-}
-
 /// The robot, its stack and the building, advanced together.
 class ClosedLoop {
  public:
-  ClosedLoop(const BenchmarkSetup& setup, const MapDirectory& map, BenchmarkResult* result)
-      : simulator_(setup.world, setup.simulator), stack_(setup.stack), result_(result) {
+  ClosedLoop(const BenchmarkSetup& setup, const WorldConfig& world, const MapDirectory& map,
+             RunRecord* record, FlightRecorder* recorder)
+      : simulator_(world, setup.simulator), stack_(setup.stack), record_(record), recorder_(recorder) {
     stack_.set_map(map);
   }
 
@@ -79,24 +66,46 @@ class ClosedLoop {
     if (odometry_.due(now_s())) add_odometry();
     if (simulator_.next_frame(&request_)) {
       simulator_.render(request_, &depth_);
+      const auto start = Clock::now();
       stack_.add_depth(depth_, simulator_.camera(), request_.stamp_s, simulator_.T_base_optical());
+      stack_s_ += seconds_since(start);
+      ++frames_;
+      if (recorder_ != nullptr) {
+        recorder_->frame(request_.stamp_s, simulator_.T_world_base(), simulator_.T_odom_base(), stack_);
+      }
     }
     command_.finished = false;
-    if (control_.due(now_s())) command_ = stack_.control(now_s());
+    if (control_.due(now_s())) {
+      const auto start = Clock::now();
+      command_ = stack_.control(now_s());
+      stack_s_ += seconds_since(start);
+    }
     if (track_.due(now_s())) {
-      result_->truth.push_back({now_s(), simulator_.T_world_base()});
+      record_->truth.push_back({now_s(), simulator_.T_world_base()});
       Pose2 T_map_robot;
-      if (stack_.estimate(&T_map_robot)) result_->estimate.push_back({now_s(), T_map_robot});
+      if (stack_.estimate(&T_map_robot)) record_->estimate.push_back({now_s(), T_map_robot});
     }
     return command_;
   }
 
-  /// Sets the robot down and lets it look for a second.
+  /// Sets the robot down and lets it look for a second; beside the waypoint if something stands on it.
   void place(const Waypoint& waypoint) {
-    simulator_.set_pose(waypoint.T_world_robot);
-    stack_.place(waypoint.T_map_robot);
-    settle();
+    Pose2 aside;
+    for (int ring = 0; ring <= 8; ++ring) {
+      for (int k = 0; k < (ring == 0 ? 1 : 12); ++k) {
+        const double angle = k * kPi / 6.0;
+        aside = {0.25 * ring * std::cos(angle), 0.25 * ring * std::sin(angle), 0.0};
+        if (!put(waypoint.T_world_robot * aside)) continue;
+        stack_.place(waypoint.T_map_robot * aside);
+        settle();
+        return;
+      }
+    }
+    throw UserError(fmt::format("no room for the robot within 2 m of waypoint '{}'.", waypoint.name));
   }
+
+  /// Of the robot's own work (all but the simulation), a frame.
+  double frame_cost_ms() const { return frames_ > 0 ? 1e3 * stack_s_ / static_cast<double>(frames_) : 0.0; }
 
   void start(const Pose2& T_map_robot) {
     stack_.place(T_map_robot);
@@ -104,6 +113,15 @@ class ClosedLoop {
   }
 
  private:
+  bool put(const Pose2& T_world_base) {
+    try {
+      simulator_.set_pose(T_world_base);
+    } catch (const UserError&) {
+      return false;  // something stands there
+    }
+    return true;
+  }
+
   void settle() {
     command_ = {};
     for (const double until_s = now_s() + 1.0; now_s() < until_s;) step();
@@ -120,7 +138,10 @@ class ClosedLoop {
 
   Simulator simulator_;
   NavigationStack stack_;
-  BenchmarkResult* result_;
+  RunRecord* record_;
+  FlightRecorder* recorder_;
+  double stack_s_ = 0.0;
+  std::size_t frames_ = 0;
   FrameRequest request_;
   cv::Mat depth_;
   Command command_;
@@ -129,7 +150,8 @@ class ClosedLoop {
   double last_odometry_s_ = 0.0;
 };
 
-Leg drive_leg(ClosedLoop& loop, const Waypoint& waypoint) {
+/// @param poll  called every simulated second; may throw to stop
+Leg drive_leg(ClosedLoop& loop, const Waypoint& waypoint, const std::function<void()>& poll) {
   Leg leg;
   leg.waypoint = waypoint.name;
   const double start_s = loop.now_s(), start_m = loop.simulator().distance_driven_m();
@@ -137,7 +159,9 @@ Leg drive_leg(ClosedLoop& loop, const Waypoint& waypoint) {
   if (!loop.stack().set_goal(waypoint.T_map_robot)) {
     leg.reason = loop.stack().failure().reason;
   } else {
+    Ticker polling(1.0);
     while (true) {
+      if (polling.due(loop.now_s())) poll();
       const Command& command = loop.step();
       if (command.finished) {
         leg.reached = command.activity == Activity::kReached;
@@ -153,14 +177,16 @@ Leg drive_leg(ClosedLoop& loop, const Waypoint& waypoint) {
   }
   leg.time_s = loop.now_s() - start_s;
   leg.distance_m = loop.simulator().distance_driven_m() - start_m;
-  if (leg.reached) leg.positioning_error_m = distance_m(loop.simulator().T_world_base(), waypoint.T_world_robot);
+  if (leg.reached)
+    leg.positioning_error_m = distance_m(loop.simulator().T_world_base(), waypoint.T_world_robot);
   return leg;
 }
 
 }  // namespace
 
-BuiltMap map_world(const BenchmarkSetup& setup, std::vector<Waypoint>* waypoints, const BenchmarkProgress& progress) {
-  Simulator simulator(setup.mapping_world, setup.simulator);
+BuiltMap map_world(const BenchmarkSetup& setup, std::vector<Waypoint>* waypoints,
+                   const BenchmarkProgress& progress) {
+  Simulator simulator(setup.world, setup.simulator);
   FrontEnd front_end(setup.stack.front_end);
   MapBuilder builder(setup.map_builder, setup.stack.local_mapper);
   TourDriver driver(setup.tour);
@@ -187,7 +213,8 @@ BuiltMap map_world(const BenchmarkSetup& setup, std::vector<Waypoint>* waypoints
     simulator.step();
     if (!simulator.next_frame(&request)) continue;
     simulator.render(request, &depth);
-    if (front_end.process(depth, simulator.camera(), request.stamp_s, T_base_optical, odometry_buffer, &profile)) {
+    if (front_end.process(depth, simulator.camera(), request.stamp_s, T_base_optical, odometry_buffer,
+                          &profile)) {
       builder.add(profile, planar_camera(T_base_optical));
     }
   }
@@ -212,31 +239,41 @@ BuiltMap map_world(const BenchmarkSetup& setup, std::vector<Waypoint>* waypoints
       }
     }
     if (best_m > setup.waypoint_within_m) {
-      throw UserError(fmt::format("{}: the tour passes place '{}' at {:.1f} m only; lead it there.", setup.tour.file,
-                                  name, best_m));
+      throw UserError(fmt::format("{}: the tour passes place '{}' at {:.1f} m only; lead it there.",
+                                  setup.tour.file, name, best_m));
     }
     waypoints->push_back(waypoint);
   }
   return built;
 }
 
-BenchmarkResult run_sequence(const BenchmarkSetup& setup, const MapDirectory& map,
-                             const std::vector<Waypoint>& waypoints, const BenchmarkProgress& progress) {
-  BenchmarkResult result;
-  ClosedLoop loop(setup, map, &result);
+RunRecord run_sequence(const BenchmarkSetup& setup, const WorldConfig& changed, const MapDirectory& map,
+                       const std::vector<Waypoint>& waypoints, const BenchmarkProgress& progress,
+                       FlightRecorder* recorder) {
+  RunRecord record;
+  const auto wall_start = Clock::now();
+  ClosedLoop loop(setup, changed, map, &record, recorder);
   loop.start(Pose2{});
+  RunResult& result = record.result;
   const double start_s = loop.now_s();
   for (std::size_t i = 0; i < waypoints.size(); ++i) {
-    progress("run", static_cast<double>(i) / static_cast<double>(waypoints.size()));
-    result.legs.push_back(drive_leg(loop, waypoints[i]));
-    if (!result.legs.back().reached) loop.place(waypoints[i]);
+    const double fraction = static_cast<double>(i) / static_cast<double>(waypoints.size());
+    result.legs.push_back(drive_leg(loop, waypoints[i], [&] { progress("run", fraction); }));
+    const Leg& leg = result.legs.back();
+    if (leg.reached) continue;
+    const Pose2& T_world_base = loop.simulator().T_world_base();
+    record.failed_at.push_back({T_world_base.x_m, T_world_base.y_m});
+    if (recorder != nullptr) recorder->failure(fmt::format("{}_{}", i + 1, leg.waypoint), leg.reason);
+    loop.place(waypoints[i]);
   }
   progress("run", 1.0);
   result.time_s = loop.now_s() - start_s;
   result.distance_m = loop.simulator().distance_driven_m();
   result.collisions = loop.simulator().contacts().collisions;
-  score(&result);
-  return result;
+  result.walker_contacts = loop.simulator().contacts().walker_contacts;
+  result.wall_s = seconds_since(wall_start);
+  result.frame_cost_ms = loop.frame_cost_ms();
+  return record;
 }
 
 }  // namespace knav

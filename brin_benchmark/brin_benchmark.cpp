@@ -1,104 +1,97 @@
-// brin_benchmark: maps a simulated building, sends the robot through its waypoints, scores it as the paper did.
+// brin_benchmark: maps a simulated building, sends the robot through its waypoints while the building
+// changes, and scores it as the paper did.
 #include <fmt/format.h>
 
+#include <ctime>
 #include <filesystem>
+#include <fstream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
-#include "brin_benchmark/benchmark.h"
-#include "core/config.h"
+#include "brin_benchmark/benchmark_report.h"
+#include "brin_benchmark/failure_bag.h"
+#include "brin_benchmark/session.h"
+#include "core/error.h"
 #include "core/progress.h"
-#include "global_map_builder/build_map_config.h"
 #include "ros_common/command_line.h"
 
 namespace knav {
 namespace {
 
-struct Options {
-  std::string world, changes, tour, config, calibration, out, sensor = "calibrated", odometry = "default";
-  std::vector<std::string> sequence;
-  int seed = 1;
-};
+const char* const kFooter =
+    R"(OUT receives map/ and waypoints.json of the mapping drive; run_NN.json, .png (map with truth, estimate, failures as red
+crosses), _truth.tum, _estimate.tum, and run_NN_LEG.bag with the 30 s before each failure; report.json and report.md.
+What OUT has already is not driven again, so an interrupted benchmark goes on where it stopped; runs made apart with
+--run K (GNU parallel, Slurm) are put together by --merge.
+report.json: runs, legs, failures, collisions, walker_contacts (counts), time_s, distance_m, {mean,max}_time_to_failure_s,
+{mean,max}_distance_to_failure_m, average_speed_mps, positioning_error_{mean,sd,max}_m, the 95 % intervals of
+failures_per_run, speed_mps and positioning_error_m, and each run with its legs.)";
 
-const char* const kJsonHelp =
-    R"(OUT/result.json holds failures, collisions (counts), time_s, distance_m, average_speed_mps,
-mean_time_to_failure_s, mean_distance_to_failure_m (the whole run's if nothing failed), positioning_error_mean_m,
-positioning_error_sd_m, seed, sensor, and legs: waypoint, reached, time_s, distance_m, positioning_error_m, reason.)";
-
-nlohmann::json to_json(const BenchmarkResult& result, const Options& options) {
-  nlohmann::json legs = nlohmann::json::array();
-  for (const Leg& leg : result.legs) {
-    nlohmann::json entry = {{"waypoint", leg.waypoint},
-                            {"reached", leg.reached},
-                            {"time_s", leg.time_s},
-                            {"distance_m", leg.distance_m}};
-    if (leg.reached) {
-      entry["positioning_error_m"] = leg.positioning_error_m;
-    } else {
-      entry["reason"] = leg.reason;
-    }
-    legs.push_back(entry);
+std::string processor() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
   }
-  return {{"failures", result.failures},
-          {"collisions", result.collisions},
-          {"time_s", result.time_s},
-          {"distance_m", result.distance_m},
-          {"average_speed_mps", result.average_speed_mps},
-          {"mean_time_to_failure_s", result.mean_time_to_failure_s},
-          {"mean_distance_to_failure_m", result.mean_distance_to_failure_m},
-          {"positioning_error_mean_m", result.positioning_error_mean_m},
-          {"positioning_error_sd_m", result.positioning_error_sd_m},
-          {"seed", options.seed},
-          {"sensor", options.sensor},
-          {"legs", legs}};
+  return "unknown processor";
 }
 
-void run(const Options& options) {
-  BenchmarkSetup setup;
-  setup.mapping_world = load_world(options.world);
-  setup.world = options.changes.empty() ? setup.mapping_world : load_world(options.changes);
-  setup.tour = load_tour(options.tour);
-  setup.sequence = options.sequence;
-  if (setup.sequence.empty()) {
-    for (const auto& place : setup.world.places) setup.sequence.push_back(place.first);
-  }
-  setup.simulator = read_config_section<SimulatorConfig>("", "simulator");
-  setup.simulator.sensor = options.sensor;
-  setup.simulator.odometry = options.odometry;
-  setup.simulator.seed = options.seed;
-  setup.stack = NavigationStackConfig::from_file(options.config);
-  if (!options.calibration.empty()) setup.stack.front_end.depth_correction.calibration_file = options.calibration;
-  setup.map_builder = read_config_section<BuildMapConfig>(options.config, "map_builder");
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  char text[16];
+  std::tm day{};
+  gmtime_r(&now, &day);
+  std::strftime(text, sizeof(text), "%Y-%m-%d", &day);
+  return text;
+}
 
+void print_summary(const std::vector<RunResult>& runs, const std::string& out) {
+  const Score s = score(runs);
+  for (const RunResult& run : runs) {
+    for (const Leg& leg : run.legs) {
+      if (!leg.reached) fmt::print("{}: {} FAILED: {}\n", run.name, leg.waypoint, leg.reason);
+    }
+  }
+  fmt::print(
+      "{} runs, {} legs: {} failures, {} collisions, {:.0f} m in {:.0f} s ({:.2f} m/s), positioning error "
+      "{:.3f} +- {:.3f} "
+      "m\n{}/report.md\n",
+      s.runs, s.legs, s.failures, s.collisions, s.distance_m, s.time_s, s.average_speed_mps,
+      s.positioning_error_mean_m, s.positioning_error_sd_m, out);
+}
+
+void drive(const SessionOptions& options) {
+  BenchmarkSession session(options);
   std::string stage;
   std::unique_ptr<Progress> bar;
-  const auto progress = [&](const std::string& now, double fraction) {
+  const auto progress = [&](const std::string& now, double fraction, const std::string& note) {
     stop_if_interrupted();
     if (now != stage) {
-      bar = std::make_unique<Progress>(now);
+      bar = std::make_unique<Progress>("brin_benchmark: " + now);
       stage = now;
     }
-    bar->update(fraction);
+    bar->update(fraction, note);
   };
-  std::vector<Waypoint> waypoints;
-  const BuiltMap built = map_world(setup, &waypoints, progress);
-  const BenchmarkResult result = run_sequence(setup, built.map, waypoints, progress);
+  session.map(progress);
+  session.run([](const std::string& stem) { return std::make_unique<FailureBag>(stem); }, progress);
   bar.reset();
+  const auto runs = session.results();
+  write_report(options.out, runs,
+               {fmt::format("{}, {}, version {}", today(), processor(), KINECT_NAV_VERSION),
+                fmt::format("world {}, changes {}", options.world, options.changes),
+                fmt::format("config {}, sensor {}, odometry {}, seed {}{}",
+                            options.config.empty() ? "default" : options.config, options.sensor,
+                            options.odometry, options.seed, options.quick ? ", quick" : "")});
+  print_summary(runs, options.out);
+}
 
-  std::error_code failed;
-  std::filesystem::create_directories(options.out, failed);
-  if (failed) throw UserError(options.out + ": cannot be made: " + failed.message() + ".");
-  save_map(options.out + "/map", built.map, true);
-  write_trajectory(options.out + "/truth.tum", result.truth);
-  write_trajectory(options.out + "/estimate.tum", result.estimate);
-  write_json(options.out + "/result.json", to_json(result, options).dump(2));
-  for (const Leg& leg : result.legs) {
-    fmt::print("{:<24} {}  {:6.1f} s  {:6.1f} m  {}\n", leg.waypoint, leg.reached ? "reached" : "FAILED ", leg.time_s,
-               leg.distance_m, leg.reached ? fmt::format("{:.3f} m off", leg.positioning_error_m) : leg.reason);
+void merge(const std::vector<std::string>& folders, const std::string& out) {
+  std::vector<RunResult> all;
+  for (const std::string& folder : folders) {
+    const auto runs = read_results(folder);
+    all.insert(all.end(), runs.begin(), runs.end());
   }
-  fmt::print("{} failures, {} collisions, {:.1f} m in {:.0f} s ({:.2f} m/s), positioning error {:.3f} +- {:.3f} m\n",
-             result.failures, result.collisions, result.distance_m, result.time_s, result.average_speed_mps,
-             result.positioning_error_mean_m, result.positioning_error_sd_m);
+  std::filesystem::create_directories(out);
+  write_report(out, all, {fmt::format("{}, merged from {} folders", today(), folders.size())});
+  print_summary(all, out);
 }
 
 }  // namespace
@@ -106,19 +99,39 @@ void run(const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Benchmark for Robotic Indoor Navigation, in simulation and lock-step: a mapping drive through the building, then\n"
-      "the robot is sent through the waypoints. A waypoint not reached in its time is a failure.");
-  knav::Options options;
-  app.add_option("--world", options.world, "world of the mapping drive, e.g. config/worlds/brin_building.yaml")->required();
-  app.add_option("--changes", options.changes, "world of the run, with people and changes; default: the same");
-  app.add_option("--tour", options.tour, "script of the mapping drive, e.g. config/worlds/brin_tour.yaml")->required();
-  app.add_option("--sequence", options.sequence, "names of places to visit in order; default: all of the world's");
+      "Benchmark for Robotic Indoor Navigation, in simulation and lock-step: a mapping drive through the "
+      "building, then\n"
+      "the robot is sent through the waypoints, again and again while the building changes. A waypoint not "
+      "reached in its\n"
+      "time is a failure.");
+  knav::SessionOptions options;
+  std::vector<std::string> folders;
+  auto* merging =
+      app.add_option("--merge", folders, "put the runs in these folders together instead of driving");
+  app.add_option("--world", options.world,
+                 "world of the mapping drive, e.g. config/worlds/brin_building.yaml");
+  app.add_option("--changes", options.changes,
+                 "sequence and changes of every run, e.g. config/worlds/brin_changes.yaml");
   app.add_option("--config", options.config, "configuration file; default: the defaults");
   app.add_option("--calibration", options.calibration, "depth calibration of the simulated Kinect");
   app.add_option("--sensor", options.sensor, "sensor preset of the simulator")->capture_default_str();
   app.add_option("--odometry", options.odometry, "odometry preset of the simulator")->capture_default_str();
-  app.add_option("--seed", options.seed, "of all noise")->check(CLI::NonNegativeNumber)->capture_default_str();
-  app.add_option("--out", options.out, "folder for result.json, the map and the trajectories")->required();
-  app.footer(knav::kJsonHelp);
-  return knav::run_command(app, argc, argv, [&] { knav::run(options); });
+  app.add_option("--run", options.run, "drive only this run, counted from 1; 0 = all")->capture_default_str();
+  app.add_option("--jobs", options.jobs, "runs driven at a time")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  app.add_option("--seed", options.seed, "of all noise")
+      ->check(CLI::Range(0, 1000000))
+      ->capture_default_str();
+  app.add_flag("--quick", options.quick, "one run, its first legs");
+  app.add_option("--out", options.out, "folder for map, runs and report")->required();
+  app.footer(knav::kFooter);
+  return knav::run_command(app, argc, argv, [&] {
+    if (*merging) return knav::merge(folders, options.out);
+    for (const auto& [name, value] :
+         {std::pair{"--world", options.world}, std::pair{"--changes", options.changes}}) {
+      if (value.empty()) throw knav::UserError(fmt::format("{} is missing; see --help.", name));
+    }
+    knav::drive(options);
+  });
 }

@@ -6,7 +6,9 @@ namespace knav {
 namespace {
 
 /// A person who sets a robot down knows the place this well.
-Eigen::Matrix3d placing_covariance() { return Eigen::Vector3d(0.1 * 0.1, 0.1 * 0.1, 0.05 * 0.05).asDiagonal(); }
+Eigen::Matrix3d placing_covariance() {
+  return Eigen::Vector3d(0.1 * 0.1, 0.1 * 0.1, 0.05 * 0.05).asDiagonal();
+}
 
 LocalizationState localization_state(LocalizationVerdict verdict) {
   switch (verdict) {
@@ -25,7 +27,8 @@ LocalizationState localization_state(LocalizationVerdict verdict) {
 /// The levelled camera's pose in the plane.
 Pose2 planar(const Eigen::Isometry3d& T_base_optical) {
   const Eigen::Vector3d forward = T_base_optical.rotation().col(2);
-  return {T_base_optical.translation().x(), T_base_optical.translation().y(), std::atan2(forward.y(), forward.x())};
+  return {T_base_optical.translation().x(), T_base_optical.translation().y(),
+          std::atan2(forward.y(), forward.x())};
 }
 
 }  // namespace
@@ -35,12 +38,15 @@ NavigationStackConfig NavigationStackConfig::from_file(const std::string& path) 
   config.front_end = FrontEndConfig::from_file(path);
   config.local_mapper = read_config_section<LocalMapperConfig>(path, "local_mapper");
   config.localizer = read_config_section<LocalizerConfig>(path, "localizer");
+  config.input = read_config_section<NavigationInputConfig>(path, "navigation");
   config.planner_tracker = read_config_section<PlannerTrackerConfig>(path, "planner_tracker");
   return config;
 }
 
 NavigationStack::NavigationStack(const NavigationStackConfig& config)
-    : front_end_(config.front_end),
+    : input_(config.input),
+      profile_config_(config.front_end.depth_profile),
+      front_end_(config.front_end),
       mapper_(config.local_mapper),
       localizer_(config.localizer),
       planner_(config.planner_tracker) {}
@@ -57,6 +63,7 @@ void NavigationStack::place(const Pose2& T_map_base) {
   planner_.clear_local_map();
   localizer_.initialize(T_map_base, placing_covariance());
   localized_ = false;
+  ++odometry_epoch_;
 }
 
 void NavigationStack::add_odometry(double stamp_s, const Pose2& T_odom_base, double v_mps, double w_radps) {
@@ -71,17 +78,32 @@ void NavigationStack::add_odometry(double stamp_s, const Pose2& T_odom_base, dou
 void NavigationStack::add_depth(const cv::Mat& depth, const PinholeModel& camera, double stamp_s,
                                 const Eigen::Isometry3d& T_base_optical) {
   if (!front_end_.process(depth, camera, stamp_s, T_base_optical, odometry_, &profile_)) return;
-  const LocalMapperResult& motion = mapper_.update(profile_, planar(T_base_optical));
+  const Pose2 T_base_camera = planar(T_base_optical);
+  if (input_.localize_with == "scan") {
+    Pose2 T_odom_base;
+    if (odometry_.at(stamp_s, 1.0, 0.2, &T_odom_base) != PoseBuffer::Lookup::kOk) return;
+    scan_from_profile(profile_, profile_config_, &scan_);
+    localize(T_base_camera, T_odom_base, odometry_epoch_, T_odom_base);
+    if (!input_.local_map) return;
+  }
+  const LocalMapperResult& motion = mapper_.update(profile_, T_base_camera);
   if (!motion.accepted) return;
-  mapper_.extract_scan_360(&scan_);
-  const LocalizerResult& pose =
-      localizer_.update(scan_, Pose2{}, motion.T_local_base, motion.epoch, &motion.T_odom_base);
-  planner_.set_scan(scan_, Pose2{});
+  if (input_.localize_with == "scan_360") {
+    mapper_.extract_scan_360(&scan_);
+    localize(Pose2{}, motion.T_local_base, motion.epoch, motion.T_odom_base);
+  }
+  if (!localized_ || !input_.local_map) return;
+  mapper_.extract_local_map(&local_map_);
+  planner_.set_local_map(local_map_, T_map_odom_ * motion.T_odom_base * motion.T_local_base.inverse());
+}
+
+void NavigationStack::localize(const Pose2& T_base_sensor, const Pose2& T_local_base, std::uint32_t epoch,
+                               const Pose2& T_odom_base) {
+  const LocalizerResult& pose = localizer_.update(scan_, T_base_sensor, T_local_base, epoch, &T_odom_base);
+  planner_.set_scan(scan_, T_base_sensor);
   if (!pose.has_pose) return;
   localized_ = true;
-  T_map_odom_ = pose.T_map_base * motion.T_odom_base.inverse();
-  mapper_.extract_local_map(&local_map_);
-  planner_.set_local_map(local_map_, pose.T_map_base * motion.T_local_base.inverse());
+  T_map_odom_ = pose.T_map_base * T_odom_base.inverse();
 }
 
 Command NavigationStack::control(double now_s) {

@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "brin_benchmark/navigation_stack_config.h"
 #include "core/camera_model.h"
 #include "core/pose_buffer.h"
 #include "depth_profile_nodelet/front_end.h"
@@ -20,13 +21,14 @@ struct NavigationStackConfig {
   LocalMapperConfig local_mapper;
   LocalizerConfig localizer;
   PlannerTrackerConfig planner_tracker;
+  NavigationInputConfig input;
 
   /// UserError names the file, section and key at fault.
   static NavigationStackConfig from_file(const std::string& path);
 };
 
-/// What runs on the robot, without ROS: the classes of the nodelets, called in the order of the graph and without its
-/// delays. Driven in lock-step by the benchmark.
+/// What runs on the robot, without ROS: the classes of the nodelets, called in the order of the graph and
+/// without its delays. Driven in lock-step by the benchmark.
 class NavigationStack {
  public:
   explicit NavigationStack(const NavigationStackConfig& config);
@@ -37,7 +39,8 @@ class NavigationStack {
 
   void add_odometry(double stamp_s, const Pose2& T_odom_base, double v_mps, double w_radps);
   /// One depth frame through front end, local mapper and localizer. Odometry must reach its stamp.
-  void add_depth(const cv::Mat& depth, const PinholeModel& camera, double stamp_s, const Eigen::Isometry3d& T_base_optical);
+  void add_depth(const cv::Mat& depth, const PinholeModel& camera, double stamp_s,
+                 const Eigen::Isometry3d& T_base_optical);
 
   /// False, with failure(), if the goal cannot be.
   bool set_goal(const Pose2& T_map_goal) { return planner_.set_goal(T_map_goal); }
@@ -49,7 +52,18 @@ class NavigationStack {
   bool estimate(Pose2* T_map_base) const;
   LocalizationVerdict verdict() const { return localizer_.result().verdict; }
 
+  /// Of the newest frame, for a record of what led to a failure.
+  const DepthProfile& profile() const { return profile_; }
+  const RangeScan& scan() const { return scan_; }
+  const LocalizerResult& localization() const { return localizer_.result(); }
+  const PlannerTracker& planner() const { return planner_; }
+
  private:
+  void localize(const Pose2& T_base_sensor, const Pose2& T_local_base, std::uint32_t epoch,
+                const Pose2& T_odom_base);
+
+  NavigationInputConfig input_;
+  DepthProfileConfig profile_config_;
   FrontEnd front_end_;
   LocalMapper mapper_;
   Localizer localizer_;
@@ -61,6 +75,7 @@ class NavigationStack {
   Pose2 T_odom_base_;
   double odometry_stamp_s_ = 0.0, v_mps_ = 0.0, w_radps_ = 0.0;
   bool localized_ = false;
+  std::uint32_t odometry_epoch_ = 0;  ///< the robot was set down elsewhere
   Pose2 T_map_odom_;
 };
 

@@ -10,6 +10,7 @@
 
 #include "core/config.h"
 #include "core/error.h"
+#include "kinect_sim/world_changes.h"
 #include "kinect_sim/world_parts.h"
 
 namespace knav {
@@ -103,11 +104,21 @@ void read_parts(YamlMap& map, const std::string& directory, WorldConfig* world) 
   if (map.has("occupancy")) read_occupancy(map.map("occupancy"), directory, world);
   for (YamlMap& part : map.maps("rooms")) read_room(part, defaults, &world->solids);
   for (YamlMap& part : map.maps("walls")) read_wall(part, defaults, &world->solids);
-  for (YamlMap& part : map.maps("boxes")) read_box(part, false, &world->solids, &world->timed_solids);
-  for (YamlMap& part : map.maps("low_obstacles")) read_box(part, true, &world->solids, &world->timed_solids);
-  for (YamlMap& part : map.maps("tables")) read_table(part, &world->solids);
-  for (YamlMap& part : map.maps("chairs")) read_chair(part, &world->solids);
-  for (YamlMap& part : map.maps("cylinders")) read_cylinder(part, &world->solids);
+  for (YamlMap& part : map.maps("boxes")) {
+    add_piece(part.point("at"), world, [&] { read_box(part, false, &world->solids, &world->timed_solids); });
+  }
+  for (YamlMap& part : map.maps("low_obstacles")) {
+    add_piece(part.point("at"), world, [&] { read_box(part, true, &world->solids, &world->timed_solids); });
+  }
+  for (YamlMap& part : map.maps("tables")) {
+    add_piece(part.point("at"), world, [&] { read_table(part, &world->solids); });
+  }
+  for (YamlMap& part : map.maps("chairs")) {
+    add_piece(part.point("at"), world, [&] { read_chair(part, &world->solids); });
+  }
+  for (YamlMap& part : map.maps("cylinders")) {
+    add_piece(part.point("at"), world, [&] { read_cylinder(part, &world->solids); });
+  }
   for (YamlMap& part : map.maps("glass")) read_glass(part, defaults, &world->solids);
   for (YamlMap& part : map.maps("signs")) read_sign(part, &world->solids);
   for (YamlMap& part : map.maps("stairs_down")) read_stairs(part, &world->solids, &world->stairs);
@@ -126,6 +137,7 @@ WorldConfig parse(const YAML::Node& node, const std::string& file, const std::st
   world.file = file;
   world.name = map.text("name", world.name.empty() ? file : world.name);
   world.ceiling_m = map.number("ceiling_m", 0, 30, world.ceiling_m);
+  read_changes(map, &world);
   read_parts(map, directory, &world);
   if (map.has("spawn")) world.spawn = map.pose_deg("spawn");
   if (map.has("places")) {

@@ -52,6 +52,12 @@ struct TimedSolid {
   double appears_s = 0.0, disappears_s = std::numeric_limits<double>::infinity();
 };
 
+/// Furniture that can be moved or taken away: the solids [first, first + count) of the world.
+struct WorldPiece {
+  Point2 at;
+  std::size_t first = 0, count = 0;
+};
+
 /// A building as config/worlds/*.yaml describes it (docs/simulator.md has the keys), broken into prisms.
 struct WorldConfig {
   std::string file;
@@ -59,6 +65,7 @@ struct WorldConfig {
   double ceiling_m = 2.6;     ///< 0: no ceiling
   std::vector<Solid> solids;  ///< always there; glass included
   std::vector<TimedSolid> timed_solids;
+  std::vector<WorldPiece> pieces;  ///< boxes, tables, chairs and cylinders that are always there
   std::vector<DoorConfig> doors;
   std::vector<PersonConfig> people;
   std::vector<FloorRect> stairs;  ///< holes in the floor

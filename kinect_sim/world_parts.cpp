@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "kinect_sim/world_changes.h"
+
 namespace knav {
 namespace {
 
@@ -159,17 +161,9 @@ DoorConfig read_door(YamlMap& map) {
   door.name = map.text("name", "");
   door.hinge = map.point("hinge");
   door.closed_end = map.point("to");
-  door.open_rad = map.number("open_deg", -180, 180, 0.0) * kDegree;
   door.thickness_m = map.number("thickness_m", 0.01, 0.2, 0.04);
   door.height_m = map.number("height_m", 0.5, 5, 2.05);
-  for (YamlMap& change : map.maps("schedule")) {
-    door.schedule.push_back({change.number("at_s", 0, 1e6), change.number("open_deg", -180, 180) * kDegree});
-    change.finish();
-    if (door.schedule.size() > 1 &&
-        door.schedule.back().at_s <= door.schedule[door.schedule.size() - 2].at_s) {
-      map.fail("schedule", "must rise in 'at_s'");
-    }
-  }
+  read_door_state(map, &door);
   map.finish();
   if (std::hypot(door.hinge.x_m - door.closed_end.x_m, door.hinge.y_m - door.closed_end.y_m) < 0.1) {
     map.fail("to", "lies on the hinge, so the door has no width");

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 
+#include "brin_benchmark/navigation_stack_config.h"
 #include "depth_profile_nodelet/front_end.h"
 #include "global_map_builder/build_map_config.h"
 #include "global_map_builder/map_server_config.h"
@@ -49,6 +50,7 @@ std::vector<Section> all_sections() {
       section<MapServerConfig>("map_server", "Publishes a map directory."),
       section<LocalizerNodeConfig>("localizer", "Where the robot is in the map."),
       section<PlannerTrackerConfig>("planner_tracker", "Takes the robot to goals."),
+      section<NavigationInputConfig>("navigation", "What the benchmark feeds localizer and planner with."),
       section<SimulatorNodeConfig>("simulator", "The simulated robot and building."),
       section<TourDriverConfig>("tour_driver", "Drives a script in the simulator, as a person would."),
   };

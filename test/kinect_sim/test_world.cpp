@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/error.h"
+#include "kinect_sim/collision_map.h"
 #include "kinect_sim/simulator.h"
 #include "kinect_sim/tour.h"
 #include "kinect_sim/world.h"
@@ -55,6 +56,61 @@ TEST(World, ContradictionsAreRefusedInWords) {
   EXPECT_THAT(fault_of("walls: 3"), AllOf(HasSubstr("'walls'"), HasSubstr("list")));
   EXPECT_THAT(fault_of("walls: [{points: [[0"), AllOf(HasSubstr("house.yaml"), HasSubstr("line")));
   EXPECT_THAT(fault_of("occupancy: {image: none.png, resolution_m: 0.05}"), HasSubstr("none.png"));
+}
+
+/// A base with a table, a box and a door, and one run's changes on top of it.
+WorldConfig changed(const std::string& changes) {
+  const std::string folder = testing::TempDir();
+  std::ofstream(folder + "changes_base.yaml")
+      << "tables: [{at: [3, 0], size: [1.0, 0.6]}]\n"
+         "boxes: [{at: [0, 3], size: [0.4, 0.2, 1.0]}]\n"
+         "doors: [{name: kitchen, hinge: [5, 0], to: [5, 1], open_deg: 90}]\n";
+  return parse_world("base: changes_base.yaml\n" + changes, "run.yaml", folder);
+}
+
+std::string fault_of_changes(const std::string& changes) {
+  try {
+    changed(changes);
+  } catch (const UserError& error) {
+    return error.what();
+  }
+  return "no fault";
+}
+
+TEST(WorldChanges, AMovedPieceStandsWhereItWasPutAndNowhereElse) {
+  const WorldConfig world = changed("moved: [{from: [0, 3], to: [-2, 4, 90]}]");
+  const CollisionMap map(world, 1.0);
+  EXPECT_GT(map.clearance_m({0, 3}), 0.7);
+  EXPECT_EQ(map.clearance_m({-2, 4}), 0.0);
+  // Turned by 90 degrees: 0.1 m to each side of x = -2, 0.2 m of y = 4.
+  EXPECT_NEAR(map.clearance_m({-1.8, 4}), 0.1, 1e-9);
+  EXPECT_NEAR(map.clearance_m({-2, 4.3}), 0.1, 1e-9);
+}
+
+TEST(WorldChanges, ARemovedTableTakesItsLegsAlongAndLeavesTheRest) {
+  const WorldConfig before = changed("");
+  const WorldConfig world = changed("removed: [[3, 0]]\nmoved: [{from: [0, 3], to: [0, 4, 0]}]");
+  EXPECT_EQ(before.solids.size(), 6u) << "a box, a table top and four legs";
+  EXPECT_EQ(world.solids.size(), 1u);
+  const CollisionMap map(world, 1.0);
+  EXPECT_GT(map.clearance_m({3, 0}), 0.7);
+  EXPECT_EQ(map.clearance_m({0, 4}), 0.0);
+}
+
+TEST(WorldChanges, ADoorOfTheBaseIsClosedByItsName) {
+  const WorldConfig world =
+      changed("door_states: [{name: kitchen, open_deg: 0, schedule: [{at_s: 10, open_deg: 90}]}]");
+  ASSERT_EQ(world.doors.size(), 1u);
+  EXPECT_EQ(door_open_at(world.doors[0], 5.0), 0.0);
+  EXPECT_NEAR(door_open_at(world.doors[0], 20.0), 1.5708, 1e-4);
+}
+
+TEST(WorldChanges, ChangesOfWhatIsNotThereAreRefusedWithTheNearest) {
+  EXPECT_THAT(fault_of_changes("removed: [[1, 3]]"), AllOf(HasSubstr("run.yaml"), HasSubstr("[0, 3]")));
+  EXPECT_THAT(fault_of_changes("moved: [{from: [9, 9], to: [1, 1, 0]}]"), HasSubstr("moved[0]/from"));
+  EXPECT_THAT(fault_of_changes("door_states: [{name: kitchn, open_deg: 0}]"),
+              HasSubstr("did you mean 'kitchen'"));
+  EXPECT_THAT(fault_of("removed: [[3, 0]]"), HasSubstr("none at all"));
 }
 
 TEST(World, AnOpeningLeavesAGapUnderItsLintel) {

@@ -1,0 +1,223 @@
+#include "brin_benchmark/session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <filesystem>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "brin_benchmark/benchmark_report.h"
+#include "core/config.h"
+#include "core/error.h"
+#include "core/file_io.h"
+#include "global_map_builder/build_map_config.h"
+
+namespace fs = std::filesystem;
+
+namespace knav {
+namespace {
+
+nlohmann::json read_json(const std::string& path) {
+  try {
+    return nlohmann::json::parse(read_text_file(path));
+  } catch (const nlohmann::json::exception& error) {
+    throw UserError(path + ": " + error.what());
+  }
+}
+
+nlohmann::json pose_json(const Pose2& pose) { return {pose.x_m, pose.y_m, pose.yaw_rad}; }
+Pose2 pose_from(const nlohmann::json& json) { return {json.at(0), json.at(1), json.at(2)}; }
+
+void write_waypoints(const std::string& path, const std::vector<Waypoint>& waypoints) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const Waypoint& w : waypoints) {
+    list.push_back({{"name", w.name},
+                    {"map_x_y_yaw_m_rad", pose_json(w.T_map_robot)},
+                    {"world_x_y_yaw_m_rad", pose_json(w.T_world_robot)}});
+  }
+  write_text_atomically(path, list.dump(1) + "\n");
+}
+
+std::vector<Waypoint> read_waypoints(const std::string& path) {
+  std::vector<Waypoint> waypoints;
+  try {
+    for (const auto& entry : read_json(path)) {
+      waypoints.push_back({entry.at("name"), pose_from(entry.at("map_x_y_yaw_m_rad")),
+                           pose_from(entry.at("world_x_y_yaw_m_rad"))});
+    }
+  } catch (const nlohmann::json::exception& error) {
+    throw UserError(path + ": is not a list of waypoints: " + error.what());
+  }
+  return waypoints;
+}
+
+/// What two sessions must share to go on with each other's files.
+nlohmann::json identity(const SessionOptions& o) {
+  const auto text = [](const std::string& path) {
+    return path.empty() ? std::string() : read_text_file(path);
+  };
+  return {{"world", o.world},
+          {"world_text", text(o.world)},
+          {"changes", o.changes},
+          {"changes_text", text(o.changes)},
+          {"config", o.config},
+          {"config_text", text(o.config)},
+          {"calibration_text", text(o.calibration)},
+          {"sensor", o.sensor},
+          {"odometry", o.odometry},
+          {"seed", o.seed},
+          {"quick", o.quick}};
+}
+
+bool is_run_result(const fs::path& path) {
+  const std::string name = path.filename().string();
+  return name.size() == 11 && name.rfind("run_", 0) == 0 && path.extension() == ".json";
+}
+
+}  // namespace
+
+BenchmarkSession::BenchmarkSession(const SessionOptions& options) : options_(options) {
+  protocol_ = load_protocol(options.changes);
+  setup_.world = load_world(options.world);
+  setup_.tour = load_tour(protocol_.tour_file);
+  setup_.sequence = protocol_.sequence;
+  if (options.quick && setup_.sequence.size() > kQuickLegs) setup_.sequence.resize(kQuickLegs);
+  setup_.simulator = read_config_section<SimulatorConfig>("", "simulator");
+  setup_.simulator.sensor = options.sensor;
+  setup_.simulator.odometry = options.odometry;
+  setup_.simulator.seed = options.seed;
+  setup_.stack = NavigationStackConfig::from_file(options.config);
+  if (!options.calibration.empty())
+    setup_.stack.front_end.depth_correction.calibration_file = options.calibration;
+  setup_.map_builder = read_config_section<BuildMapConfig>(options.config, "map_builder");
+  if (options.run < 0 || options.run > static_cast<int>(protocol_.runs.size())) {
+    throw UserError(fmt::format("{}: has {} runs; there is no run {}.", options.changes,
+                                protocol_.runs.size(), options.run));
+  }
+  // Every run's building is read now: a fault in the last one should not show after an hour.
+  for (const BenchmarkRun& run : protocol_.runs) changed_world(options.world, protocol_, run);
+
+  std::error_code failed;
+  fs::create_directories(options.out, failed);
+  if (failed) throw UserError(options.out + ": cannot be made: " + failed.message() + ".");
+  const std::string setup_file = options.out + "/setup.json";
+  const nlohmann::json now = identity(options);
+  if (!fs::exists(setup_file)) {
+    write_text_atomically(setup_file, now.dump(1) + "\n");
+    return;
+  }
+  const nlohmann::json before = read_json(setup_file);
+  for (const auto& [key, value] : now.items()) {
+    if (before.value(key, nlohmann::json()) == value) continue;
+    throw UserError(fmt::format(
+        "{}: holds a benchmark with another '{}'; choose another folder, or remove it.", options.out, key));
+  }
+}
+
+std::string BenchmarkSession::stem(std::size_t run) const {
+  return fmt::format("{}/run_{:02}", options_.out, run + 1);
+}
+
+void BenchmarkSession::map(const SessionProgress& progress) {
+  const std::string folder = options_.out + "/map", file = options_.out + "/waypoints.json";
+  if (!fs::exists(file)) {
+    const BuiltMap built = map_world(setup_, &waypoints_, [&](const std::string& stage, double fraction) {
+      progress(stage, fraction, fmt::format("{:.0f} m", setup_.tour.length_m()));
+    });
+    save_map(folder, built.map, true);
+    write_waypoints(file, waypoints_);  // last: it says that the map is whole
+  }
+  map_ = load_map(folder);
+  waypoints_ = read_waypoints(file);
+}
+
+std::vector<std::size_t> BenchmarkSession::missing_runs() const {
+  std::vector<std::size_t> runs;
+  for (std::size_t i = 0; i < protocol_.runs.size(); ++i) {
+    if (options_.run > 0 && i + 1 != static_cast<std::size_t>(options_.run)) continue;
+    if (!fs::exists(stem(i) + ".json")) runs.push_back(i);
+    if (options_.quick && options_.run == 0) break;
+  }
+  return runs;
+}
+
+void BenchmarkSession::drive(std::size_t run, const RecorderFactory& recorder,
+                             const std::function<void(double)>& progress) {
+  BenchmarkSetup setup = setup_;
+  // Every run has its own noise, whatever ran before it and in which process.
+  setup.simulator.seed = options_.seed + 1000 * static_cast<int>(run + 1);
+  const WorldConfig world = changed_world(options_.world, protocol_, protocol_.runs[run]);
+  const std::unique_ptr<FlightRecorder> flight = recorder ? recorder(stem(run)) : nullptr;
+  RunRecord record = run_sequence(
+      setup, world, map_, waypoints_, [&](const std::string&, double fraction) { progress(fraction); },
+      flight.get());
+  record.result.name = protocol_.runs[run].name;
+  write_trajectory(stem(run) + "_truth.tum", record.truth);
+  write_trajectory(stem(run) + "_estimate.tum", record.estimate);
+  write_run_picture(stem(run) + ".png", map_, waypoints_, record);
+  write_text_atomically(stem(run) + ".json",
+                        to_json(record.result).dump(1) + "\n");  // last: the run is whole
+}
+
+void BenchmarkSession::run(const RecorderFactory& recorder, const SessionProgress& progress) {
+  const std::vector<std::size_t> runs = missing_runs();
+  std::vector<double> done(runs.size(), 0.0);
+  std::mutex mutex;
+  std::exception_ptr fault;
+  std::atomic<std::size_t> next{0};
+  const auto report = [&](std::size_t k, double fraction) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (fault) std::rethrow_exception(fault);
+    done[k] = fraction;
+    double sum = 0.0;
+    for (const double d : done) sum += d;
+    progress("runs", sum / static_cast<double>(runs.size()), fmt::format("{} to drive", runs.size()));
+  };
+  const auto work = [&] {
+    try {
+      for (std::size_t k = next++; k < runs.size(); k = next++) {
+        drive(runs[k], recorder, [&](double fraction) { report(k, fraction); });
+      }
+    } catch (...) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      if (!fault) fault = std::current_exception();
+    }
+  };
+  std::vector<std::thread> others;
+  const int jobs = std::clamp(options_.jobs, 1, std::max(1, static_cast<int>(runs.size())));
+  for (int i = 1; i < jobs; ++i) others.emplace_back(work);
+  work();
+  for (std::thread& thread : others) thread.join();
+  if (fault) std::rethrow_exception(fault);
+}
+
+std::vector<RunResult> BenchmarkSession::results() const { return read_results(options_.out); }
+
+std::vector<RunResult> read_results(const std::string& folder) {
+  std::vector<std::string> files;
+  std::error_code failed;
+  for (const auto& entry : fs::directory_iterator(folder, failed)) {
+    if (is_run_result(entry.path())) files.push_back(entry.path().string());
+  }
+  if (failed) throw UserError(folder + ": cannot be read: " + failed.message() + ".");
+  if (files.empty()) throw UserError(folder + ": holds no run_NN.json; is it the folder of a benchmark?");
+  std::sort(files.begin(), files.end());
+  std::vector<RunResult> runs;
+  for (const std::string& file : files) runs.push_back(run_from_json(read_json(file), file));
+  return runs;
+}
+
+void write_report(const std::string& folder, const std::vector<RunResult>& runs,
+                  const std::vector<std::string>& about) {
+  nlohmann::json json = to_json(score(runs));
+  json["about"] = about;
+  for (const RunResult& run : runs) json["each"].push_back(to_json(run));
+  write_text_atomically(folder + "/report.json", json.dump(1) + "\n");
+  write_text_atomically(folder + "/report.md", report_markdown(runs, about));
+}
+
+}  // namespace knav
