@@ -77,17 +77,19 @@ std::vector<char> FloorPlan::flood(const std::vector<Solid>& added, double clear
       open[i] = map_.global().clearance_of(map_.global().squared_cells[i]) >= clearance_m;
     }
   }
+  // What is added is rounded up to whole cells, as the building itself is.
+  const double away_m = clearance_m + 1.5 * kCell_m;
   for (const Solid& solid : added) {
     double low_x = 1e9, low_y = 1e9, high_x = -1e9, high_y = -1e9;
     for (const Point2& c : solid.corners) {
-      low_x = std::min(low_x, c.x_m - clearance_m);
-      high_x = std::max(high_x, c.x_m + clearance_m);
-      low_y = std::min(low_y, c.y_m - clearance_m);
-      high_y = std::max(high_y, c.y_m + clearance_m);
+      low_x = std::min(low_x, c.x_m - away_m);
+      high_x = std::max(high_x, c.x_m + away_m);
+      low_y = std::min(low_y, c.y_m - away_m);
+      high_y = std::max(high_y, c.y_m + away_m);
     }
     for (int iy = std::max(0, g.cell_y(low_y)); iy <= std::min(g.height_cells - 1, g.cell_y(high_y)); ++iy) {
       for (int ix = std::max(0, g.cell_x(low_x)); ix <= std::min(g.width_cells - 1, g.cell_x(high_x)); ++ix) {
-        if (footprint_distance_m(solid, {g.center_x_m(ix), g.center_y_m(iy)}) < clearance_m)
+        if (footprint_distance_m(solid, {g.center_x_m(ix), g.center_y_m(iy)}) < away_m)
           open[g.index(ix, iy)] = 0;
       }
     }

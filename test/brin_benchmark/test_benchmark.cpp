@@ -1,7 +1,12 @@
 #include <gtest/gtest.h>
 
-#include "brin_benchmark/benchmark.h"
+#include <filesystem>
+#include <fstream>
+
+#include "brin_benchmark/session.h"
 #include "core/error.h"
+
+namespace fs = std::filesystem;
 
 namespace knav {
 namespace {
@@ -40,23 +45,54 @@ BenchmarkSetup room_setup() {
   return setup;
 }
 
-TEST(Benchmark, RobotMapsARoomAndReachesItsWaypoints) {
-  const BenchmarkSetup setup = room_setup();
-  std::vector<Waypoint> waypoints;
-  const BuiltMap built = map_world(setup, &waypoints, [](const std::string&, double) {});
-  ASSERT_EQ(waypoints.size(), 2u);
-  EXPECT_NEAR(waypoints[0].T_world_robot.x_m, 2.8, 0.1);
-  const RunResult result =
-      run_sequence(setup, setup.world, built.map, waypoints, [](const std::string&, double) {}).result;
-  ASSERT_EQ(result.legs.size(), 2u);
-  for (const Leg& leg : result.legs) {
-    EXPECT_TRUE(leg.reached) << leg.waypoint << ": " << leg.reason;
-    // Goal tolerance 0.05 m plus three times the 0.05 m that localization is asked for in a furnished
-    // building.
-    EXPECT_LT(leg.positioning_error_m, 0.20) << leg.waypoint;
+TEST(Benchmark, RobotMapsARoomReachesItsWaypointsAndASecondSessionDrivesNothingAgain) {
+  const std::string folder = testing::TempDir() + "benchmark_session";
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  std::ofstream(folder + "/room.yaml") << kRoom;
+  std::ofstream(folder + "/tour.yaml") << kTour;
+  std::ofstream(folder + "/changes.yaml")
+      << "tour: tour.yaml\nsequence: [far, near]\nruns:\n"
+         "  - {name: moved, moved: [{from: [1.6, -1.4], to: [1.8, -1.5, 10]}]}\n";
+  SessionOptions options;
+  options.world = folder + "/room.yaml";
+  options.changes = folder + "/changes.yaml";
+  options.out = folder + "/out";
+  const auto quiet = [](const std::string&, double, const std::string&) {};
+  {
+    BenchmarkSession session(options);
+    session.map(quiet);
+    session.run({}, quiet);
+    const std::vector<RunResult> runs = session.results();
+    ASSERT_EQ(runs.size(), 1u);
+    EXPECT_EQ(runs[0].name, "moved");
+    ASSERT_EQ(runs[0].legs.size(), 2u);
+    for (const Leg& leg : runs[0].legs) {
+      EXPECT_TRUE(leg.reached) << leg.waypoint << ": " << leg.reason;
+      // Goal tolerance 0.05 m plus three times the 0.05 m that localization is asked for in a furnished
+      // building.
+      EXPECT_LT(leg.positioning_error_m, 0.20) << leg.waypoint;
+    }
+    EXPECT_EQ(runs[0].collisions, 0u);
+    EXPECT_GT(runs[0].distance_m, 4.0);
+    write_report(options.out, runs, {"a test"});
   }
-  EXPECT_EQ(result.collisions, 0u);
-  EXPECT_GT(result.distance_m, 4.0);
+  for (const char* file :
+       {"run_01.json", "run_01.png", "run_01_truth.tum", "report.json", "report.md", "map/map.yaml"}) {
+    EXPECT_TRUE(fs::exists(options.out + "/" + file)) << file;
+  }
+  {
+    int stages = 0;
+    BenchmarkSession again(options);
+    const auto count = [&](const std::string&, double, const std::string&) { ++stages; };
+    again.map(count);
+    again.run({}, count);
+    EXPECT_EQ(stages, 0) << "all of it was there";
+    EXPECT_EQ(again.results().size(), 1u);
+  }
+  options.seed = 2;
+  EXPECT_THROW(BenchmarkSession{options}, UserError) << "another seed is another benchmark";
+  fs::remove_all(folder);
 }
 
 TEST(Benchmark, PlaceOffTheTourIsRefusedByName) {
