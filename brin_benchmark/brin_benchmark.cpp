@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "brin_benchmark/benchmark_report.h"
+#include "brin_benchmark/configurations.h"
 #include "brin_benchmark/failure_bag.h"
 #include "brin_benchmark/session.h"
 #include "core/error.h"
@@ -112,7 +113,8 @@ int main(int argc, char** argv) {
                  "world of the mapping drive, e.g. config/worlds/brin_building.yaml");
   app.add_option("--changes", options.changes,
                  "sequence and changes of every run, e.g. config/worlds/brin_changes.yaml");
-  app.add_option("--config", options.config, "configuration file; default: the defaults");
+  app.add_option("--config", options.config, "default, paper_full, paper_baseline, or a file")
+      ->default_str("default");
   app.add_option("--calibration", options.calibration, "depth calibration of the simulated Kinect");
   app.add_option("--sensor", options.sensor, "sensor preset of the simulator")->capture_default_str();
   app.add_option("--odometry", options.odometry, "odometry preset of the simulator")->capture_default_str();
@@ -132,6 +134,7 @@ int main(int argc, char** argv) {
          {std::pair{"--world", options.world}, std::pair{"--changes", options.changes}}) {
       if (value.empty()) throw knav::UserError(fmt::format("{} is missing; see --help.", name));
     }
+    options.config = knav::configuration_file(options.config);
     knav::drive(options);
   });
 }

@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 
+#include "brin_benchmark/configurations.h"
 #include "brin_benchmark/session.h"
 #include "core/error.h"
 
@@ -93,6 +96,31 @@ TEST(Benchmark, RobotMapsARoomReachesItsWaypointsAndASecondSessionDrivesNothingA
   options.seed = 2;
   EXPECT_THROW(BenchmarkSession{options}, UserError) << "another seed is another benchmark";
   fs::remove_all(folder);
+}
+
+/// "a/b/c" -> value, of every scalar.
+void flatten(const YAML::Node& node, const std::string& path, std::map<std::string, std::string>* values) {
+  if (!node.IsMap()) {
+    (*values)[path] = YAML::Dump(node);
+    return;
+  }
+  for (const auto& entry : node) flatten(entry.second, path + "/" + entry.first.as<std::string>(), values);
+}
+
+TEST(Configurations, ThePapersTwoRunsDifferInTheTwoKeysOnly) {
+  std::map<std::string, std::string> full, baseline;
+  flatten(YAML::LoadFile(configuration_file("paper_full")), "", &full);
+  flatten(YAML::LoadFile(configuration_file("paper_baseline")), "", &baseline);
+  std::vector<std::string> different;
+  for (const auto& [key, value] : full) {
+    if (baseline[key] != value) different.push_back(key);
+  }
+  EXPECT_EQ(full.size(), baseline.size());
+  EXPECT_EQ(different, (std::vector<std::string>{"/navigation/local_map", "/navigation/localize_with"}));
+  // And both are good configurations.
+  EXPECT_FALSE(NavigationStackConfig::from_file(configuration_file("paper_baseline")).input.local_map);
+  EXPECT_EQ(configuration_file("default"), "");
+  EXPECT_THROW(configuration_file("papper"), UserError);
 }
 
 TEST(Benchmark, PlaceOffTheTourIsRefusedByName) {
