@@ -16,7 +16,7 @@ function(kinect_nav_ros target)
   target_include_directories(${target} SYSTEM PRIVATE
     ${catkin_INCLUDE_DIRS} ${CATKIN_DEVEL_PREFIX}/${CATKIN_GLOBAL_INCLUDE_DESTINATION})
   target_link_libraries(${target} PUBLIC ${catkin_LIBRARIES} PRIVATE kinect_nav_warnings)
-  add_dependencies(${target} ${PROJECT_NAME}_generate_messages_cpp)
+  add_dependencies(${target} ${PROJECT_NAME}_generate_messages_cpp ${PROJECT_NAME}_gencfg)
 endfunction()
 
 # kinect_nav_nodelets(COMPONENT SOURCES... LINK libs...): libkinect_nav_COMPONENT_nodelets.so, named in

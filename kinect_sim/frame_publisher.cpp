@@ -11,15 +11,21 @@ namespace knav {
 FramePublisher::FramePublisher(ros::NodeHandle& handle, Simulator& simulator,
                                const SimulatorNodeConfig& config)
     : simulator_(simulator), config_(config) {
-  image_ = handle.advertise<sensor_msgs::Image>("camera/depth/image_raw", 4);
-  info_ = handle.advertise<sensor_msgs::CameraInfo>("camera/depth/camera_info", 4);
+  if (config.openni2_device.empty()) {
+    image_ = handle.advertise<sensor_msgs::Image>("camera/depth/image_raw", 4);
+    info_ = handle.advertise<sensor_msgs::CameraInfo>("camera/depth/camera_info", 4);
+    infrared_ = handle.advertise<sensor_msgs::Image>("camera/ir/image", 4);
+    infrared_info_ = handle.advertise<sensor_msgs::CameraInfo>("camera/ir/camera_info", 4);
+  } else {
+    openni2_ = std::make_unique<OpenNI2Output>(config.openni2_device, simulator);
+  }
   lidar_ = handle.advertise<sensor_msgs::LaserScan>("lidar_scan", 4);
   range_ = handle.advertise<sensor_msgs::Range>("range", 4);
   perfect_ = handle.advertise<sensor_msgs::LaserScan>("perfect_scan_360", 4);
 }
 
 bool FramePublisher::anybody_listens() const {
-  return depth_is_wanted() || lidar_.getNumSubscribers() > 0 || perfect_.getNumSubscribers() > 0 ||
+  return depth_is_wanted() || infrared_.getNumSubscribers() > 0 || (openni2_ && openni2_->wanted()) || lidar_.getNumSubscribers() > 0 || perfect_.getNumSubscribers() > 0 ||
          range_.getNumSubscribers() > 0;
 }
 
@@ -33,15 +39,30 @@ sensor_msgs::ImagePtr FramePublisher::free_image() {
   return image;
 }
 
+void FramePublisher::publish_depth(const FrameRequest& request) {
+  const sensor_msgs::ImagePtr image = free_image();
+  image->encoding = "16UC1";
+  cv::Mat view = depth_view(image.get());
+  simulator_.render(request, &view);
+  image->header.stamp.fromSec(request.stamp_s);
+  info_.publish(camera_info_message(simulator_.camera(), request.stamp_s));
+  image_.publish(image);
+}
+
+void FramePublisher::publish_infrared(const FrameRequest& request) {
+  const sensor_msgs::ImagePtr image = free_image();
+  image->encoding = "mono16";
+  cv::Mat view = depth_view(image.get());
+  simulator_.render_infrared(request, &view);
+  image->header.stamp.fromSec(request.stamp_s);
+  infrared_info_.publish(camera_info_message(simulator_.infrared_camera(), request.stamp_s));
+  infrared_.publish(image);
+}
+
 void FramePublisher::publish(const FrameRequest& request) {
-  if (depth_is_wanted()) {
-    const sensor_msgs::ImagePtr image = free_image();
-    cv::Mat view = depth_view(image.get());
-    simulator_.render(request, &view);
-    image->header.stamp.fromSec(request.stamp_s);
-    info_.publish(camera_info_message(simulator_.camera(), request.stamp_s));
-    image_.publish(image);
-  }
+  if (openni2_) openni2_->render(simulator_, request);
+  if (depth_is_wanted()) publish_depth(request);
+  if (infrared_.getNumSubscribers() > 0) publish_infrared(request);
   const auto every =
       static_cast<std::uint64_t>(std::max(1L, std::lround(config_.frame_rate_hz / config_.scan_rate_hz)));
   if (request.index % every != 0) return;

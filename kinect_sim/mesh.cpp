@@ -93,6 +93,11 @@ WorldMeshes::WorldMeshes(const WorldConfig& world) {
   for (const Solid& solid : world.solids) {
     if (solid.material != Material::kGlass) building.add(solid);
   }
+  for (const Panel& panel : world.panels) {
+    std::vector<Eigen::Vector3f> corners;
+    for (const Eigen::Vector3d& corner : panel.corners) corners.push_back(corner.cast<float>());
+    building.add_face(corners, panel.material);
+  }
   meshes_.push_back(std::move(building));
   for (const PersonConfig& person : world.people) meshes_.push_back(person_mesh(person));
   first_door_ = meshes_.size();

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "kinect_sim/depth_renderer.h"
+#include "kinect_sim/infrared_camera.h"
 #include "kinect_sim/scene.h"
 
 namespace knav {
@@ -53,6 +54,7 @@ struct Simulator::Rendering {
   DepthRenderer renderer;
   KinectModel kinect;
   std::vector<float> z_m, signal;
+  std::unique_ptr<InfraredCamera> infrared;  // made when it is first looked through
 };
 
 Simulator::Simulator(const WorldConfig& world, const SimulatorConfig& config)
@@ -207,16 +209,18 @@ void Simulator::request_now(FrameRequest* request) const {
 }
 
 template <class Row>
-void Simulator::for_each_row(const FrameRequest& request, const Row& row) {
+void Simulator::for_each_row(const FrameRequest& request, DepthRenderer& renderer, int rows, const Row& row) {
   Rendering& r = *rendering_;
   const Eigen::Isometry3d mount = T_base_optical();
   const double row_s = config_.readout_s / (r.camera.height_px - 1);
+  const double scale = static_cast<double>(r.camera.height_px) / rows;  // a row of an image of other size
   const auto optical = [&](int v) {
-    const Pose2 base = request.pose_at(request.stamp_s + (v - config_.stamp_row_px) * row_s);
+    const double image_row = (v + 0.5) * scale - 0.5;
+    const Pose2 base = request.pose_at(request.stamp_s + (image_row - config_.stamp_row_px) * row_s);
     return Eigen::Isometry3f((isometry(base) * mount).cast<float>());
   };
-  const int last = r.camera.height_px - 1;
-  r.renderer.start_frame(request.dynamic, optical(0), optical(last));
+  const int last = rows - 1;
+  renderer.start_frame(request.dynamic, optical(0), optical(last));
   for (int v = 0; v <= last; ++v) row(v, optical(v));
 }
 
@@ -224,16 +228,31 @@ void Simulator::render(const FrameRequest& request, cv::Mat* depth_mm) {
   Rendering& r = *rendering_;
   depth_mm->create(r.camera.height_px, r.camera.width_px, CV_16UC1);
   r.kinect.start_frame(request.index, request.stamp_s);
-  for_each_row(request, [&](int v, const Eigen::Isometry3f& T_world_optical) {
+  for_each_row(request, r.renderer, r.camera.height_px, [&](int v, const Eigen::Isometry3f& T_world_optical) {
     r.renderer.render_row(T_world_optical, v, r.z_m.data(), r.signal.data());
     r.kinect.sense_row(v, {r.z_m.data(), r.signal.data()}, depth_mm->ptr<std::uint16_t>(v));
   });
 }
 
+PinholeModel Simulator::infrared_camera() const { return InfraredCamera::camera_of(rendering_->camera); }
+
+void Simulator::render_infrared(const FrameRequest& request, cv::Mat* infrared) {
+  Rendering& r = *rendering_;
+  if (!r.infrared) {
+    r.infrared = std::make_unique<InfraredCamera>(r.meshes, r.camera, static_cast<std::uint64_t>(config_.seed));
+  }
+  infrared->create(r.camera.height_px, r.camera.width_px, CV_16UC1);
+  r.infrared->start_frame(request.index);
+  for_each_row(request, r.infrared->renderer(), r.camera.height_px * InfraredCamera::kFine,
+               [&](int v, const Eigen::Isometry3f& T_world_optical) {
+                 r.infrared->take_row(T_world_optical, v, infrared->ptr<std::uint16_t>());
+               });
+}
+
 void Simulator::render_true_depth(const FrameRequest& request, cv::Mat* depth_m) {
   Rendering& r = *rendering_;
   depth_m->create(r.camera.height_px, r.camera.width_px, CV_32FC1);
-  for_each_row(request, [&](int v, const Eigen::Isometry3f& T_world_optical) {
+  for_each_row(request, r.renderer, r.camera.height_px, [&](int v, const Eigen::Isometry3f& T_world_optical) {
     float* out = depth_m->ptr<float>(v);
     r.renderer.render_row(T_world_optical, v, out, nullptr);
     for (int u = 0; u < r.camera.width_px; ++u) {

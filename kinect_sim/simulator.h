@@ -21,6 +21,8 @@
 
 namespace knav {
 
+class DepthRenderer;
+
 /// What was where while one depth frame was read out; enough to render it later or in another thread.
 struct FrameRequest {
   std::uint64_t index = 0;
@@ -77,6 +79,9 @@ class Simulator {
   void request_now(FrameRequest* request) const;
   /// 16UC1 mm, 0 = invalid. Allocates only if the image has not the right size yet.
   void render(const FrameRequest& request, cv::Mat* depth_mm);
+  /// 16UC1, 10 bits: the IR image of the same instant, through infrared_camera().
+  void render_infrared(const FrameRequest& request, cv::Mat* infrared);
+  PinholeModel infrared_camera() const;
   /// 32FC1 m of the true depth along the optical axis, NaN = nothing; same rolling shutter, no sensor faults.
   void render_true_depth(const FrameRequest& request, cv::Mat* depth_m);
   /// The planar LIDAR (180 deg, 361 rays, noise) at its mount T_base_laser().
@@ -98,7 +103,7 @@ class Simulator {
   /// Between the robot's rim and the nearest solid or person; negative = overlapping.
   double gap_m(const Pose2& pose) const;
   template <class Row>
-  void for_each_row(const FrameRequest& request, const Row& row);
+  void for_each_row(const FrameRequest& request, DepthRenderer& renderer, int rows, const Row& row);
   void cast_scan(const FrameRequest& request, const Pose2& T_world_sensor, double height_m, int rays,
                  RangeScan* scan);
 

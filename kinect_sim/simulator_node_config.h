@@ -13,6 +13,7 @@ struct SimulatorNodeConfig : SimulatorConfig {
   double odom_rate_hz = 50.0;
   double scan_rate_hz = 10.0;
   double perfect_scan_height_m = 0.5;
+  std::string openni2_device;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -28,10 +29,17 @@ struct SimulatorNodeConfig : SimulatorConfig {
     v.number("scan_rate_hz", scan_rate_hz, 1, 30, "Hz", "LIDAR and perfect scan, while somebody listens.");
     v.number("perfect_scan_height_m", perfect_scan_height_m, 0.02, 2, "m",
              "Height of the perfect scan's plane.");
+    v.text("openni2_device", openni2_device,
+           "Shows the Kinect as the OpenNI2 device kinect_nav_simulated/NAME instead of publishing its images. "
+           "Empty: publishes them.");
   }
   std::vector<std::string> validate() const {
-    return SimulatorConfig::validate();  // 'world' is asked for where it is needed: programs take it as an
-                                         // argument
+    // 'world' is asked for where it is needed: programs take it as an argument.
+    std::vector<std::string> faults = SimulatorConfig::validate();
+    if (!openni2_device.empty() && mode == "lockstep") {
+      faults.push_back("'openni2_device' needs mode 'realtime': a device does not wait.");
+    }
+    return faults;
   }
 };
 

@@ -7,6 +7,7 @@
 #include <std_msgs/String.h>
 #include <std_msgs/UInt32.h>
 #include <std_srvs/Empty.h>
+#include <std_srvs/SetBool.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <atomic>
@@ -71,6 +72,11 @@ class SimulatorNodelet : public NodeletBase {
     set_pose_ =
         handle.subscribe<geometry_msgs::PoseStamped>("set_pose", 5, &SimulatorNodelet::on_set_pose, this);
     reset_ = getPrivateNodeHandle().advertiseService("reset", &SimulatorNodelet::on_reset, this);
+    if (frames_->openni2() != nullptr) {
+      plug_ = getPrivateNodeHandle().advertiseService("set_plugged", &SimulatorNodelet::on_set_plugged, this);
+      stream_ = getPrivateNodeHandle().advertiseService("set_streaming", &SimulatorNodelet::on_set_streaming, this);
+      NODELET_INFO("The Kinect is the OpenNI2 device kinect_nav_simulated/%s.", config_.openni2_device.c_str());
+    }
     publish_mounts();
     publish_contacts(true);
     lockstep_ = config_.mode == "lockstep";
@@ -104,6 +110,20 @@ class SimulatorNodelet : public NodeletBase {
     return true;
   }
 
+  bool on_set_plugged(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response) {
+    frames_->openni2()->set_plugged(request.data);
+    response.success = true;
+    response.message = request.data ? "plugged in" : "unplugged";
+    return true;
+  }
+
+  bool on_set_streaming(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response) {
+    frames_->openni2()->set_streaming(request.data);
+    response.success = true;
+    response.message = request.data ? "sends frames" : "connected, but silent";
+    return true;
+  }
+
   void step_loop() {
     const auto step =
         std::chrono::duration_cast<Wall::duration>(std::chrono::duration<double>(config_.step_s));
@@ -126,6 +146,7 @@ class SimulatorNodelet : public NodeletBase {
 
   void one_step() {
     bool frame_due = false;
+    if (frames_->openni2() != nullptr) frames_->openni2()->keep_alive();
     {
       const std::lock_guard<std::mutex> lock(state_mutex_);
       simulator_->step();
@@ -273,7 +294,7 @@ class SimulatorNodelet : public NodeletBase {
   ros::Publisher clock_, odometry_, truth_, tf_, tf_static_, people_, collisions_, walker_contacts_, bumper_,
       diagnostics_, statistics_;
   ros::Subscriber command_, set_pose_;
-  ros::ServiceServer reset_;
+  ros::ServiceServer reset_, plug_, stream_;
   bool lockstep_ = false;
   std::mutex state_mutex_;  ///< the simulator's state, against commands from ROS
   FrameRequest next_request_;

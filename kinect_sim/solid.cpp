@@ -24,6 +24,10 @@ double albedo(Material material) {
       return 0.04;
     case Material::kPerson:
       return 0.40;
+    case Material::kPaper:
+      return 0.80;
+    case Material::kInk:
+      return 0.15;
     case Material::kGlass:
     case Material::kSun:
       return 0.0;

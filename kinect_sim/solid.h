@@ -18,7 +18,9 @@ enum class Material : std::uint8_t {
   kDark,
   kPerson,
   kGlass,
-  kSun
+  kSun,
+  kPaper,
+  kInk
 };
 
 /// Share of the projector's light that comes back, in [0, 1]; 0 for glass (seen through) and sun patches

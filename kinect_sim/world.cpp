@@ -121,6 +121,8 @@ void read_parts(YamlMap& map, const std::string& directory, WorldConfig* world) 
   }
   for (YamlMap& part : map.maps("glass")) read_glass(part, defaults, &world->solids);
   for (YamlMap& part : map.maps("signs")) read_sign(part, &world->solids);
+  for (YamlMap& part : map.maps("chessboards")) read_chessboard(part, &world->panels);
+  for (YamlMap& part : map.maps("markers")) read_marker(part, &world->panels);
   for (YamlMap& part : map.maps("stairs_down")) read_stairs(part, &world->solids, &world->stairs);
   for (YamlMap& part : map.maps("sun_patches")) {
     world->sun_patches.push_back(read_floor_rect(part));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <limits>
 #include <map>
 #include <string>
@@ -58,6 +59,13 @@ struct WorldPiece {
   std::size_t first = 0, count = 0;
 };
 
+/// A flat piece of paper: seen, but nothing to run into. Convex, counter-clockwise as seen from its front; nothing
+/// behind. Frame: world [m].
+struct Panel {
+  std::vector<Eigen::Vector3d> corners;
+  Material material = Material::kPaper;
+};
+
 /// A building as config/worlds/*.yaml describes it (docs/simulator.md has the keys), broken into prisms.
 struct WorldConfig {
   std::string file;
@@ -66,6 +74,7 @@ struct WorldConfig {
   std::vector<Solid> solids;  ///< always there; glass included
   std::vector<TimedSolid> timed_solids;
   std::vector<WorldPiece> pieces;  ///< boxes, tables, chairs and cylinders that are always there
+  std::vector<Panel> panels;  ///< chessboards and markers
   std::vector<DoorConfig> doors;
   std::vector<PersonConfig> people;
   std::vector<FloorRect> stairs;  ///< holes in the floor

@@ -21,6 +21,9 @@ void read_chair(YamlMap& map, std::vector<Solid>* solids);
 void read_cylinder(YamlMap& map, std::vector<Solid>* solids);
 void read_glass(YamlMap& map, const WorldDefaults& defaults, std::vector<Solid>* solids);
 void read_sign(YamlMap& map, std::vector<Solid>* solids);
+/// A printed chessboard, and the marker a range finder is aimed at; both hang with their middle at a height.
+void read_chessboard(YamlMap& map, std::vector<Panel>* panels);
+void read_marker(YamlMap& map, std::vector<Panel>* panels);
 void read_stairs(YamlMap& map, std::vector<Solid>* solids, std::vector<FloorRect>* holes);
 FloorRect read_floor_rect(YamlMap& map);
 DoorConfig read_door(YamlMap& map);

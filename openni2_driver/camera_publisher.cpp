@@ -33,10 +33,10 @@ sensor_msgs::CameraInfoPtr scaled_camera_info(const sensor_msgs::CameraInfo& cal
 
 CameraPublisher::CameraPublisher(ros::NodeHandle& node, SensorStream stream,
                                  const OpenNI2CameraConfig& config, std::function<void(bool)> on_subscribers)
-    : stream_(stream), config_(config) {
+    : stream_(stream) {
   const bool depth = stream == SensorStream::kDepth;
   frame_id_ = depth ? config.depth_frame_id : config.ir_frame_id;
-  time_offset_s_ = depth ? config.depth_time_offset : config.ir_time_offset;
+  configure(config);
   const ros::SubscriberStatusCallback changed =
       [this, on_subscribers](const ros::SingleSubscriberPublisher&) { on_subscribers(subscribed()); };
   const std::string image_topic = depth ? "camera/depth/image_raw" : "camera/ir/image";
@@ -46,18 +46,26 @@ CameraPublisher::CameraPublisher(ros::NodeHandle& node, SensorStream stream,
   info_ = node.advertise<sensor_msgs::CameraInfo>(info_topic, 4, changed, changed);
 }
 
+void CameraPublisher::configure(const OpenNI2CameraConfig& config) {
+  const bool depth = stream_ == SensorStream::kDepth;
+  std::lock_guard<std::mutex> lock(mutex_);
+  settings_.use_device_time = config.use_device_time;
+  settings_.time_offset_s = depth ? config.depth_time_offset : config.ir_time_offset;
+  settings_.principal_offset_x_px = depth ? config.depth_ir_offset_x : 0.0;
+  settings_.principal_offset_y_px = depth ? config.depth_ir_offset_y : 0.0;
+}
+
 bool CameraPublisher::subscribed() const {
   std::lock_guard<std::mutex> lock(mutex_);
   return image_.getNumSubscribers() + info_.getNumSubscribers() > 0;
 }
 
 sensor_msgs::CameraInfoPtr CameraPublisher::camera_info(
-    const SensorFrame& frame, camera_info_manager::CameraInfoManager* calibration) const {
+    const SensorFrame& frame, const Settings& settings,
+    camera_info_manager::CameraInfoManager* calibration) const {
   if (calibration != nullptr && calibration->isCalibrated()) {
-    const bool depth = stream_ == SensorStream::kDepth;
-    auto info =
-        scaled_camera_info(calibration->getCameraInfo(), frame.width_px, frame.height_px,
-                           depth ? config_.depth_ir_offset_x : 0.0, depth ? config_.depth_ir_offset_y : 0.0);
+    auto info = scaled_camera_info(calibration->getCameraInfo(), frame.width_px, frame.height_px,
+                                   settings.principal_offset_x_px, settings.principal_offset_y_px);
     if (info) return info;
     ROS_WARN_ONCE("The IR camera's calibration has other proportions than its %dx%d images; it is not used.",
                   frame.width_px, frame.height_px);
@@ -77,9 +85,14 @@ sensor_msgs::CameraInfoPtr CameraPublisher::camera_info(
 
 void CameraPublisher::publish(const SensorFrame& frame, double now_s,
                               camera_info_manager::CameraInfoManager* calibration) {
+  Settings settings;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    settings = settings_;
+  }
   // Kept up even when the device's time is not used, for the diagnostics.
   const double device_s = clock_.to_host_s(frame.device_time_us, now_s);
-  const double stamp_s = (config_.use_device_time ? device_s : now_s) + time_offset_s_;
+  const double stamp_s = (settings.use_device_time ? device_s : now_s) + settings.time_offset_s;
   const ros::Time stamp(std::max(stamp_s, 0.0));
 
   auto image = boost::make_shared<sensor_msgs::Image>();
@@ -93,7 +106,7 @@ void CameraPublisher::publish(const SensorFrame& frame, double now_s,
   image->data.resize(static_cast<std::size_t>(image->step) * image->height);
   copy_pixels(frame, reinterpret_cast<uint16_t*>(image->data.data()));
 
-  sensor_msgs::CameraInfoPtr info = camera_info(frame, calibration);
+  sensor_msgs::CameraInfoPtr info = camera_info(frame, settings, calibration);
   info->header = image->header;
   image_.publish(image);
   info_.publish(info);

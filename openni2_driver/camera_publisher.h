@@ -24,20 +24,25 @@ class CameraPublisher {
   CameraPublisher(ros::NodeHandle& node, SensorStream stream, const OpenNI2CameraConfig& config,
                   std::function<void(bool)> on_subscribers);
   bool subscribed() const;
+  /// Offsets and the choice of the clock may change while it runs; frame and topics stay.
+  void configure(const OpenNI2CameraConfig& config);
   /// Images and camera_info with the same stamp. `calibration` may be null.
   void publish(const SensorFrame& frame, double now_s, camera_info_manager::CameraInfoManager* calibration);
   double clock_offset_s() const { return clock_.offset_s(); }
 
  private:
-  sensor_msgs::CameraInfoPtr camera_info(const SensorFrame& frame,
+  struct Settings {
+    bool use_device_time = true;
+    double time_offset_s = 0.0, principal_offset_x_px = 0.0, principal_offset_y_px = 0.0;
+  };
+  sensor_msgs::CameraInfoPtr camera_info(const SensorFrame& frame, const Settings& settings,
                                          camera_info_manager::CameraInfoManager* calibration) const;
 
   SensorStream stream_;
-  const OpenNI2CameraConfig& config_;
   std::string frame_id_;
-  double time_offset_s_;
   DeviceClock clock_;
-  mutable std::mutex mutex_;  // a subscriber may come while the topics are being advertised
+  mutable std::mutex mutex_;  // of the settings; and a subscriber may come while the topics are being advertised
+  Settings settings_;
   ros::Publisher image_, info_;
 };
 

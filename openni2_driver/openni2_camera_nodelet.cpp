@@ -1,4 +1,6 @@
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <dynamic_reconfigure/server.h>
+#include <kinect_nav/OpenNI2CameraConfig.h>
 
 #include <atomic>
 #include <cctype>
@@ -10,6 +12,7 @@
 #include "openni2_driver/openni_device.h"
 #include "ros_common/nodelet_base.h"
 #include "ros_common/parameters.h"
+#include "ros_common/reconfigure.h"
 
 namespace knav {
 
@@ -18,6 +21,7 @@ class OpenNI2CameraNodelet final : public NodeletBase {
  public:
   ~OpenNI2CameraNodelet() override {
     timer_.stop();
+    reconfigure_.reset();
     // First the device, whose thread uses the publishers; not under the lock, which that thread may be
     // waiting for.
     std::unique_ptr<OpenNIDevice> device;
@@ -53,6 +57,16 @@ class OpenNI2CameraNodelet final : public NodeletBase {
     // Wall time: diagnostics are wanted most when nothing drives a simulated clock.
     timer_ = node.createWallTimer(ros::WallDuration(0.5),
                                   [this](const ros::WallTimerEvent&) { updater_->update(); });
+    reconfigure_ = std::make_unique<Reconfigure>(reconfigure_mutex_, getPrivateNodeHandle());
+    reconfigure_->setCallback(
+        [this](kinect_nav::OpenNI2CameraConfig& wanted, uint32_t) { reconfigure(wanted); });
+  }
+
+  void reconfigure(const kinect_nav::OpenNI2CameraConfig& wanted) {
+    apply_reconfiguration(wanted, &config_);
+    for (const auto& publisher : publishers_) publisher->configure(config_);
+    std::lock_guard<std::mutex> lock(device_mutex_);
+    if (device_) device_->configure(config_.device);
   }
 
   void publish(const SensorFrame& frame) {
@@ -120,6 +134,11 @@ class OpenNI2CameraNodelet final : public NodeletBase {
     out.add("openings", status.openings);
     out.add("disconnections", status.disconnections);
     out.add("stalls", status.stalls);
+    out.add("recoveries", status.recoveries);
+    out.addf("waited for the first opening [s]", "%.1f", status.waited_s);
+    out.addf("last outage [s]", "%.1f", status.last_outage_s);
+    out.add("last event", status.last_event);
+    out.addf("last event's age [s]", "%.1f", status.last_event_age_s);
     const char* names[] = {"depth", "ir"};
     for (int i = 0; i < kSensorStreamCount; ++i) {
       const std::string name = names[i];
@@ -134,7 +153,11 @@ class OpenNI2CameraNodelet final : public NodeletBase {
     last_diagnosis_ = now;
   }
 
-  OpenNI2CameraConfig config_;
+  using Reconfigure = dynamic_reconfigure::Server<kinect_nav::OpenNI2CameraConfig>;
+
+  OpenNI2CameraConfig config_;  // what can be changed: under reconfigure_mutex_
+  boost::recursive_mutex reconfigure_mutex_;
+  std::unique_ptr<Reconfigure> reconfigure_;
   std::unique_ptr<CameraPublisher> publishers_[kSensorStreamCount];
   std::unique_ptr<camera_info_manager::CameraInfoManager> calibration_;  // of the device's thread
   std::string calibration_name_;

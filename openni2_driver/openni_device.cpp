@@ -38,6 +38,7 @@ OpenNIDevice::OpenNIDevice(const OpenNIDeviceConfig& config, FrameHandler on_fra
     : config_(config),
       on_frame_(std::move(on_frame)),
       on_event_(std::move(on_event)),
+      started_s_(steady_s()),
       finished_(run_on_parked_thread([this] { run(); })) {}
 
 OpenNIDevice::~OpenNIDevice() {
@@ -58,9 +59,23 @@ void OpenNIDevice::request(SensorStream stream, bool on) {
   wake_.notify_all();
 }
 
+void OpenNIDevice::configure(const OpenNIDeviceConfig& config) {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    new_config_ = std::make_unique<OpenNIDeviceConfig>(config);
+    woken_ = true;
+  }
+  wake_.notify_all();
+}
+
 DeviceStatus OpenNIDevice::status() const {
   std::lock_guard<std::mutex> lock(mutex_);
-  return status_;
+  DeviceStatus status = status_;
+  const double now_s = steady_s();
+  if (status.openings == 0) status.waited_s = now_s - started_s_;
+  if (outage_since_s_ >= 0.0) status.last_outage_s = now_s - outage_since_s_;
+  if (!status.last_event.empty()) status.last_event_age_s = now_s - last_event_s_;
+  return status;
 }
 
 bool OpenNIDevice::stopping() const {
@@ -81,7 +96,49 @@ void OpenNIDevice::report_problem(const std::string& problem) {
   }
   if (problem == reported_) return;
   reported_ = problem;
-  if (!problem.empty()) on_event_(true, problem);
+  if (!problem.empty()) tell(true, problem);
+}
+
+void OpenNIDevice::tell(bool fault, const std::string& sentence) {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    status_.last_event = sentence;
+    last_event_s_ = steady_s();
+  }
+  on_event_(fault, sentence);
+}
+
+void OpenNIDevice::begin_outage() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (outage_since_s_ < 0.0) outage_since_s_ = steady_s();
+}
+
+void OpenNIDevice::end_outage() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (outage_since_s_ < 0.0) return;
+  status_.last_outage_s = steady_s() - outage_since_s_;
+  ++status_.recoveries;
+  outage_since_s_ = -1.0;
+}
+
+void OpenNIDevice::take_new_config() {
+  std::unique_ptr<OpenNIDeviceConfig> config;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    config = std::move(new_config_);
+  }
+  if (!config) return;
+  config->device_id = config_.device_id;
+  config_ = *config;
+  if (session_) {
+    session_->configure(config_);
+    next_start_s_ = 0.0;
+    last_index_[0] = last_index_[1] = -1;
+  } else if (ended_ && (lost_ ? config_.enable_reconnect : config_.playback_repeat)) {
+    ended_ = false;
+    std::lock_guard<std::mutex> lock(mutex_);
+    status_.state = DeviceState::kSearching;
+  }
 }
 
 bool OpenNIDevice::open() {
@@ -106,11 +163,15 @@ bool OpenNIDevice::open() {
   last_index_[0] = last_index_[1] = -1;
   last_frame_s_ = steady_s();
   next_start_s_ = 0.0;
+  const bool was_lost = lost_;
   lost_ = false;
   bool was_stalled = false;
+  double away_s = 0.0;
   {
     std::lock_guard<std::mutex> lock(mutex_);
     was_stalled = status_.state == DeviceState::kStalled;
+    if (status_.openings == 0) status_.waited_s = steady_s() - started_s_;
+    away_s = was_lost ? steady_s() - outage_since_s_ : status_.openings == 0 ? status_.waited_s : 0.0;
     ++status_.openings;
     status_.uri = session_->uri();
     status_.vendor = session_->vendor();
@@ -124,9 +185,11 @@ bool OpenNIDevice::open() {
   }
   if (!was_stalled) {
     reported_.clear();
-    on_event_(false,
-              fmt::format("Opened {} {}, serial number {} ({}).", session_->vendor(), session_->name(),
-                          session_->serial().empty() ? "unknown" : session_->serial(), session_->uri()));
+    const char* when = was_lost ? " {:.1f} s after it was lost" : " after {:.1f} s of waiting";
+    tell(false,
+         fmt::format("Opened {} {}, serial number {} ({}){}.", session_->vendor(), session_->name(),
+                     session_->serial().empty() ? "unknown" : session_->serial(), session_->uri(),
+                     was_lost || away_s > 1.0 ? fmt::format(fmt::runtime(when), away_s) : ""));
   }
   return true;
 }
@@ -163,15 +226,19 @@ void OpenNIDevice::apply_requests() {
   const bool any = session_->streaming(SensorStream::kDepth) || session_->streaming(SensorStream::kInfrared);
   if (started || !any) last_frame_s_ = steady_s();
   if (!problem.empty()) report_problem(problem);
-  std::lock_guard<std::mutex> lock(mutex_);
+  bool idle = false;
+  std::unique_lock<std::mutex> lock(mutex_);
   if (status_.state != DeviceState::kStalled)
     status_.state = any ? DeviceState::kStreaming : DeviceState::kIdle;
   if (!wanted[0] && !wanted[1]) {
     status_.state = DeviceState::kIdle;
     status_.problem.clear();
+    idle = true;
   } else if (started && problem.empty() && status_.state == DeviceState::kStreaming) {
     status_.problem.clear();
   }
+  lock.unlock();
+  if (idle) end_outage();
 }
 
 void OpenNIDevice::deliver(const SensorFrame& frame) {
@@ -192,9 +259,10 @@ void OpenNIDevice::deliver(const SensorFrame& frame) {
     }
   }
   last_index_[stream] = frame.index;
+  end_outage();
   if (recovered) {
     reported_.clear();
-    on_event_(false, session_->uri() + ": sends frames again.");
+    tell(false, session_->uri() + ": sends frames again.");
   }
   on_frame_(frame);
 }
@@ -211,9 +279,9 @@ void OpenNIDevice::read_frames() {
 }
 
 void OpenNIDevice::run() {
-  bool ended = false;
   while (!stopping()) {
-    if (ended) {
+    take_new_config();
+    if (ended_) {
       wait(1.0);
       continue;
     }
@@ -233,13 +301,14 @@ void OpenNIDevice::run() {
         std::lock_guard<std::mutex> lock(mutex_);
         ++status_.disconnections;
       }
-      ended = !config_.enable_reconnect;
+      begin_outage();
+      ended_ = !config_.enable_reconnect;
       lost_ = true;
-      close(ended ? DeviceState::kEnded : DeviceState::kSearching,
-            uri + (ended ? ": was unplugged, and enable_reconnect is false."
+      close(ended_ ? DeviceState::kEnded : DeviceState::kSearching,
+            uri + (ended_ ? ": was unplugged, and enable_reconnect is false."
                          : ": was unplugged. Waiting for it."));
     } else if (session_->at_end_of_file() && !config_.playback_repeat) {
-      ended = true;
+      ended_ = true;
       close(DeviceState::kEnded, uri + ": the recording is at its end.");
     } else if (streaming && steady_s() - last_frame_s_ > config_.stall_timeout_s) {
       {
@@ -247,6 +316,7 @@ void OpenNIDevice::run() {
         ++status_.stalls;
         status_.state = DeviceState::kStalled;
       }
+      begin_outage();
       const std::string problem =
           fmt::format("{}: sent no frame for {:.1f} s.", uri, config_.stall_timeout_s);
       if (config_.enable_reconnect) {

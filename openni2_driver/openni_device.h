@@ -30,6 +30,11 @@ struct DeviceStatus {
   int openings = 0;
   int disconnections = 0;
   int stalls = 0;
+  int recoveries = 0;          ///< times frames (or, if nobody wants any, the device) were back after a loss or stall
+  double waited_s = 0.0;       ///< from the start to the first opening, or until now
+  double last_outage_s = 0.0;  ///< from the last loss or stall to its recovery, or until now
+  std::string last_event;      ///< the last sentence told to the event handler
+  double last_event_age_s = 0.0;
   uint64_t frames[kSensorStreamCount] = {0, 0};
   uint64_t missed_frames[kSensorStreamCount] = {0, 0};  ///< gaps in the frame index
 };
@@ -51,6 +56,8 @@ class OpenNIDevice {
 
   /// Images of this stream are wanted, or no longer.
   void request(SensorStream stream, bool on);
+  /// All but device_id takes effect while it runs; a stream in another mode is started anew.
+  void configure(const OpenNIDeviceConfig& config);
   DeviceStatus status() const;
 
  private:
@@ -61,18 +68,24 @@ class OpenNIDevice {
   void close(DeviceState state, const std::string& problem);
   void apply_requests();
   void read_frames();
+  void take_new_config();
   void report_problem(const std::string& problem);
+  void tell(bool fault, const std::string& sentence);
+  void begin_outage();
+  void end_outage();
   void deliver(const SensorFrame& frame);
 
   OpenNIDeviceConfig config_;
   FrameHandler on_frame_;
   EventHandler on_event_;
 
-  mutable std::mutex mutex_;  // guards the three below
+  mutable std::mutex mutex_;  // guards the following
   std::condition_variable wake_;
   bool stop_ = false, woken_ = false;
   bool wanted_[kSensorStreamCount] = {false, false};
   DeviceStatus status_;
+  std::unique_ptr<OpenNIDeviceConfig> new_config_;
+  double started_s_ = 0.0, outage_since_s_ = -1.0, last_event_s_ = 0.0;  // steady clock; -1: no outage
 
   // Only the device's thread uses these.
   std::shared_ptr<OpenNIRuntime> runtime_;  // kept while the device is away: starting it anew is slow
@@ -82,6 +95,7 @@ class OpenNIDevice {
   int last_index_[kSensorStreamCount] = {-1, -1};
   std::string reported_;
   bool lost_ = false;  // was unplugged: that it is not there has been said
+  bool ended_ = false;
 
   std::future<void> finished_;
 };

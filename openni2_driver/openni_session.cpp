@@ -162,6 +162,20 @@ OpenNISession::OpenNISession(std::shared_ptr<OpenNIRuntime> runtime, const Resol
   }
 }
 
+void OpenNISession::configure(const OpenNIDeviceConfig& config) {
+  Parts& p = *parts_;
+  const bool same_mode = config.width_px == p.config.width_px && config.height_px == p.config.height_px &&
+                         config.rate_hz == p.config.rate_hz;
+  p.config = config;
+  if (p.is_file) {
+    openni::PlaybackControl* playback = p.device.getPlaybackControl();
+    if (playback != nullptr) playback->setRepeatEnabled(config.playback_repeat);
+  } else if (!same_mode) {
+    p.stop(SensorStream::kDepth);
+    p.stop(SensorStream::kInfrared);
+  }
+}
+
 OpenNISession::~OpenNISession() {
   parts_->stop(SensorStream::kDepth);
   parts_->stop(SensorStream::kInfrared);

@@ -23,6 +23,8 @@ class OpenNISession {
   /// Starts or stops a stream; UserError if the device has none or refuses the mode.
   void set_streaming(SensorStream stream, bool on);
   bool streaming(SensorStream stream) const;
+  /// For streams started from now on; a stream that runs in another mode is stopped.
+  void configure(const OpenNIDeviceConfig& config);
   /// Hands over one waiting frame, if there is one. Never blocks. UserError for a pixel format that is
   /// neither depth nor grey.
   bool read(const std::function<void(const SensorFrame&)>& handle);

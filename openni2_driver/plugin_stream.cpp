@@ -101,4 +101,6 @@ void PluginStream::end_frame(OniFrame* frame) {
   getServices().releaseFrame(frame);
 }
 
+void PluginStream::drop_frame(OniFrame* frame) { getServices().releaseFrame(frame); }
+
 }  // namespace knav

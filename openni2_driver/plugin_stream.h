@@ -34,6 +34,8 @@ class PluginStream : public oni::driver::StreamBase {
   OniFrame* begin_frame(uint64_t time_us, int index);
   /// Hands it to the runtime.
   void end_frame(OniFrame* frame);
+  /// Gives a frame back that was not filled after all.
+  void drop_frame(OniFrame* frame);
   std::atomic<bool> running_{false};
 
  private:

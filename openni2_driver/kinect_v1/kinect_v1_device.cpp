@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 namespace knav {
 namespace {
@@ -62,31 +61,21 @@ void KinectV1Stream::send(const uint16_t* raw, uint64_t time_us) {
 }
 
 KinectV1Device::KinectV1Device(FreenectLoop& loop, const KinectOnUsb& kinect)
-    : loop_(loop),
-      kinect_(kinect),
-      depth_modes_(modes_of(ONI_SENSOR_DEPTH)),
-      ir_modes_(modes_of(ONI_SENSOR_IR)) {
-  sensors_[0] = {ONI_SENSOR_DEPTH, 1, depth_modes_.data()};
-  sensors_[1] = {ONI_SENSOR_IR, 1, ir_modes_.data()};
+    : PluginDevice(kinect.serial), loop_(loop) {
   handle_ = loop_.open(kinect, this);
   if (handle_ == nullptr) return;
   plane_ = loop_.zero_plane(handle_);
   table_ = DisparityTable(plane_);
-  sensor_count_ = loop_.has_ir() ? 2 : 1;
+  add_sensor(ONI_SENSOR_DEPTH, modes_of(ONI_SENSOR_DEPTH));
+  if (loop_.has_ir()) add_sensor(ONI_SENSOR_IR, modes_of(ONI_SENSOR_IR));
 }
 
 KinectV1Device::~KinectV1Device() {
   if (handle_ != nullptr) loop_.close(handle_);
 }
 
-OniStatus KinectV1Device::getSensorInfoList(OniSensorInfo** infos, int* count) {
-  *infos = sensors_;
-  *count = sensor_count_;
-  return ONI_STATUS_OK;
-}
-
 oni::driver::StreamBase* KinectV1Device::createStream(OniSensorType type) {
-  if (type != ONI_SENSOR_DEPTH && (type != ONI_SENSOR_IR || sensor_count_ < 2)) return nullptr;
+  if (!has_sensor(type)) return nullptr;
   std::lock_guard<std::mutex> lock(mutex_);
   KinectV1Stream*& place = type == ONI_SENSOR_DEPTH ? depth_ : ir_;
   if (place != nullptr) return nullptr;  // the hardware has one of each
@@ -103,20 +92,6 @@ void KinectV1Device::destroyStream(oni::driver::StreamBase* stream) {
     (ours->type() == ONI_SENSOR_DEPTH ? depth_ : ir_) = nullptr;
   }
   delete ours;
-}
-
-OniStatus KinectV1Device::getProperty(int property, void* data, int* size) {
-  if (property != ONI_DEVICE_PROPERTY_SERIAL_NUMBER || kinect_.serial.empty())
-    return ONI_STATUS_NOT_IMPLEMENTED;
-  const int needed = static_cast<int>(kinect_.serial.size()) + 1;
-  if (*size < needed) return ONI_STATUS_BAD_PARAMETER;
-  std::memcpy(data, kinect_.serial.c_str(), static_cast<std::size_t>(needed));
-  *size = needed;
-  return ONI_STATUS_OK;
-}
-
-OniBool KinectV1Device::isPropertySupported(int property) {
-  return property == ONI_DEVICE_PROPERTY_SERIAL_NUMBER && !kinect_.serial.empty() ? TRUE : FALSE;
 }
 
 void KinectV1Device::on_depth(const uint16_t* codes, uint32_t ticks) {

@@ -7,7 +7,7 @@
 #include "openni2_driver/kinect_v1/disparity.h"
 #include "openni2_driver/kinect_v1/freenect_loop.h"
 #include "openni2_driver/kinect_v1/tick_clock.h"
-#include "openni2_driver/plugin_stream.h"
+#include "openni2_driver/plugin_device.h"
 
 namespace knav {
 
@@ -34,18 +34,15 @@ class KinectV1Stream final : public PluginStream {
   int index_ = 0;
 };
 
-class KinectV1Device final : public oni::driver::DeviceBase, public KinectFrames {
+class KinectV1Device final : public PluginDevice, public KinectFrames {
  public:
   /// `opened()` tells whether it worked.
   KinectV1Device(FreenectLoop& loop, const KinectOnUsb& kinect);
   ~KinectV1Device() override;
   bool opened() const { return handle_ != nullptr; }
 
-  OniStatus getSensorInfoList(OniSensorInfo** infos, int* count) override;
   oni::driver::StreamBase* createStream(OniSensorType type) override;
   void destroyStream(oni::driver::StreamBase* stream) override;
-  OniStatus getProperty(int property, void* data, int* size) override;
-  OniBool isPropertySupported(int property) override;
 
   void on_depth(const uint16_t* codes, uint32_t ticks) override;
   void on_ir(const uint16_t* pixels, uint32_t ticks) override;
@@ -53,14 +50,10 @@ class KinectV1Device final : public oni::driver::DeviceBase, public KinectFrames
  private:
   friend class KinectV1Stream;
   FreenectLoop& loop_;
-  KinectOnUsb kinect_;
   freenect_device* handle_ = nullptr;
   ZeroPlane plane_;
   DisparityTable table_;
   TickClock depth_clock_, ir_clock_;
-  std::vector<OniVideoMode> depth_modes_, ir_modes_;
-  OniSensorInfo sensors_[2];
-  int sensor_count_ = 1;
   std::mutex mutex_;  // guards the two below
   KinectV1Stream *depth_ = nullptr, *ir_ = nullptr;
 };

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 
 namespace knav {
 namespace {
@@ -95,39 +94,15 @@ void VirtualStream::run() {
 }
 
 VirtualDevice::VirtualDevice(int index, std::shared_ptr<VirtualCable> cable)
-    : serial_(virtual_serial(index)),
-      source_(make_frame_source(index)),
-      cable_(std::move(cable)),
-      depth_modes_(virtual_modes(ONI_PIXEL_FORMAT_DEPTH_1_MM)),
-      ir_modes_(virtual_modes(ONI_PIXEL_FORMAT_GRAY16)) {
-  sensors_[0] = {ONI_SENSOR_DEPTH, static_cast<int>(depth_modes_.size()), depth_modes_.data()};
-  sensors_[1] = {ONI_SENSOR_IR, static_cast<int>(ir_modes_.size()), ir_modes_.data()};
-}
-
-OniStatus VirtualDevice::getSensorInfoList(OniSensorInfo** infos, int* count) {
-  *infos = sensors_;
-  *count = 2;
-  return ONI_STATUS_OK;
+    : PluginDevice(virtual_serial(index)), source_(make_frame_source(index)), cable_(std::move(cable)) {
+  add_sensor(ONI_SENSOR_DEPTH, virtual_modes(ONI_PIXEL_FORMAT_DEPTH_1_MM));
+  add_sensor(ONI_SENSOR_IR, virtual_modes(ONI_PIXEL_FORMAT_GRAY16));
 }
 
 oni::driver::StreamBase* VirtualDevice::createStream(OniSensorType type) {
-  if (type != ONI_SENSOR_DEPTH && type != ONI_SENSOR_IR) return nullptr;
-  return new VirtualStream(type, source_, cable_);
+  return has_sensor(type) ? new VirtualStream(type, source_, cable_) : nullptr;
 }
 
 void VirtualDevice::destroyStream(oni::driver::StreamBase* stream) { delete stream; }
-
-OniStatus VirtualDevice::getProperty(int property, void* data, int* size) {
-  if (property != ONI_DEVICE_PROPERTY_SERIAL_NUMBER) return ONI_STATUS_NOT_IMPLEMENTED;
-  const int needed = static_cast<int>(serial_.size()) + 1;
-  if (*size < needed) return ONI_STATUS_BAD_PARAMETER;
-  std::memcpy(data, serial_.c_str(), static_cast<std::size_t>(needed));
-  *size = needed;
-  return ONI_STATUS_OK;
-}
-
-OniBool VirtualDevice::isPropertySupported(int property) {
-  return property == ONI_DEVICE_PROPERTY_SERIAL_NUMBER ? TRUE : FALSE;
-}
 
 }  // namespace knav

@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "openni2_driver/plugin_stream.h"
+#include "openni2_driver/plugin_device.h"
 #include "openni2_driver/virtual_device/frame_source.h"
 
 namespace knav {
@@ -41,21 +41,15 @@ class VirtualStream final : public PluginStream {
   std::thread thread_;
 };
 
-class VirtualDevice final : public oni::driver::DeviceBase {
+class VirtualDevice final : public PluginDevice {
  public:
   VirtualDevice(int index, std::shared_ptr<VirtualCable> cable);
-  OniStatus getSensorInfoList(OniSensorInfo** infos, int* count) override;
   oni::driver::StreamBase* createStream(OniSensorType type) override;
   void destroyStream(oni::driver::StreamBase* stream) override;
-  OniStatus getProperty(int property, void* data, int* size) override;
-  OniBool isPropertySupported(int property) override;
 
  private:
-  std::string serial_;
   std::shared_ptr<FrameSource> source_;
   std::shared_ptr<VirtualCable> cable_;
-  std::vector<OniVideoMode> depth_modes_, ir_modes_;
-  OniSensorInfo sensors_[2];
 };
 
 std::string virtual_serial(int index);
