@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
   std::string world_path, out, script, sensor = "default";
   std::vector<double> view;
   double scale = 40.0, far_m = 8.0;
-  bool top_view = false;
+  bool top_view = false, infrared = false;
   app.add_option("WORLD", world_path, "World file")->required();
   app.add_option("OUT", out, "PNG file to write")->required();
   app.add_flag("--top-view", top_view, "The plan (default)");
@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
   app.add_option("--scale", scale, "Pixels per metre of the plan")->check(CLI::Range(1.0, 500.0));
   CLI::Option* view_option =
       app.add_option("--view", view, "x y yaw_deg: depth image from there")->expected(3);
+  app.add_flag("--infrared", infrared, "With --view: the IR image instead, 10 bits as 8")->needs(view_option);
   app.add_option("--sensor", sensor, "ideal | calibrated | default | harsh")
       ->check(CLI::IsMember(knav::KinectConfig::preset_names()));
   app.add_option("--far", far_m, "Depth [m] at the end of the colour scale");
@@ -47,9 +48,14 @@ int main(int argc, char** argv) {
       simulator.set_pose({view[0], view[1], view[2] * knav::kPi / 180.0});
       knav::FrameRequest request;
       simulator.request_now(&request);
-      cv::Mat depth_mm;
-      simulator.render(request, &depth_mm);
-      image = knav::depth_picture(depth_mm, far_m);
+      cv::Mat pixels;
+      if (infrared) {
+        simulator.render_infrared(request, &pixels);
+        pixels.convertTo(image, CV_8U, 0.25);
+      } else {
+        simulator.render(request, &pixels);
+        image = knav::depth_picture(pixels, far_m);
+      }
     } else {
       knav::WorldPicture picture(world, scale);
       picture.draw_world();

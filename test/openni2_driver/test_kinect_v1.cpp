@@ -2,14 +2,18 @@
 // ctest, which puts our folder and fakenect's on LD_LIBRARY_PATH.
 
 #include <gmock/gmock.h>
-#include <sys/stat.h>
 
 #include <cmath>
 
+#include "fakenect_dump.h"
 #include "openni2_driver/kinect_v1/disparity.h"
 #include "virtual_device_fixture.h"
 
 using knav::DeviceState;
+using knav::fakenect::code_at;
+using knav::fakenect::kDistinctFrames;
+using knav::fakenect::kHeight;
+using knav::fakenect::kWidth;
 using knav::OpenNIDeviceConfig;
 using knav::SensorStream;
 using knav::WatchedDevice;
@@ -17,61 +21,22 @@ using testing::HasSubstr;
 
 namespace {
 
-constexpr int kWidth = 640, kHeight = 480;
-
-constexpr int kFrames = 180, kDistinctFrames = 40;
-
-/// Every code from 0 to 2047 lies in every frame; the corner tells the frame's number.
-uint16_t code_at(int u, int v, int frame) {
-  if (u == 0 && v == 0) return static_cast<uint16_t>(600 + frame);
-  return static_cast<uint16_t>((v * kWidth + u + 37 * frame) % 2048);
-}
+constexpr int kFrames = 180;
 
 /// fakenect plays its dump once in a process, so the tests share one and run in this order; the last sees its
 /// end.
 class KinectV1Test : public ::testing::Test {
  protected:
-  /// libfreenect's format: an index, and a PGM with raw codes for every frame, named by time and the Kinect's
-  /// ticks.
   static void SetUpTestSuite() {
     directory_ = ::testing::TempDir() + "kinect_nav_dump_" + std::to_string(getpid());
-    mkdir(directory_.c_str(), 0700);
     setenv("FAKENECT_PATH", directory_.c_str(), 1);
-    std::ofstream index(directory_ + "/INDEX.txt");
-    for (int frame = 0; frame < kFrames; ++frame) {
-      char name[100];
-      // The counter wraps soon after the beginning.
-      const unsigned ticks = 4294967295U - 3000000U + 2000000U * static_cast<unsigned>(frame);
-      std::snprintf(name, sizeof(name), "d-%.6f-%u-0.pgm", 1000.0 + frame / 30.0, ticks);
-      names_.emplace_back(name);
-      index << name << "\n";
-      const std::string path = directory_ + "/" + name;
-      if (frame >= kDistinctFrames) {
-        const std::string same = directory_ + "/" + names_[static_cast<std::size_t>(frame % kDistinctFrames)];
-        ASSERT_EQ(link(same.c_str(), path.c_str()), 0);
-        continue;
-      }
-      std::vector<uint16_t> codes(static_cast<std::size_t>(kWidth * kHeight));
-      for (int v = 0; v < kHeight; ++v) {
-        for (int u = 0; u < kWidth; ++u)
-          codes[static_cast<std::size_t>(v * kWidth + u)] = code_at(u, v, frame);
-      }
-      std::ofstream file(path, std::ios::binary);
-      file << "P5 640 480 65535\n";
-      file.write(reinterpret_cast<const char*>(codes.data()), static_cast<std::streamsize>(codes.size() * 2));
-    }
+    knav::fakenect::write_dump(directory_, kFrames);
   }
-  static void TearDownTestSuite() {
-    for (const std::string& name : names_) std::remove((directory_ + "/" + name).c_str());
-    std::remove((directory_ + "/INDEX.txt").c_str());
-    rmdir(directory_.c_str());
-  }
+  static void TearDownTestSuite() { std::filesystem::remove_all(directory_); }
 
   static std::string directory_;
-  static std::vector<std::string> names_;
 };
 std::string KinectV1Test::directory_;
-std::vector<std::string> KinectV1Test::names_;
 
 }  // namespace
 
