@@ -46,13 +46,15 @@ class OpenNI2CameraNodelet final : public NodeletBase {
     updater_->setHardwareID("none");
     updater_->add("device", this, &OpenNI2CameraNodelet::diagnose);
 
-    std::lock_guard<std::mutex> lock(device_mutex_);
-    device_ = std::make_unique<OpenNIDevice>(
-        config_.device, [this](const SensorFrame& frame) { publish(frame); },
-        [this](bool fault, const std::string& sentence) { report(fault, sentence); });
-    // Whoever subscribed before the device existed.
-    for (int i = 0; i < kSensorStreamCount; ++i) {
-      device_->request(static_cast<SensorStream>(i), publishers_[i]->subscribed());
+    {
+      std::lock_guard<std::mutex> lock(device_mutex_);
+      device_ = std::make_unique<OpenNIDevice>(
+          config_.device, [this](const SensorFrame& frame) { publish(frame); },
+          [this](bool fault, const std::string& sentence) { report(fault, sentence); });
+      // Whoever subscribed before the device existed.
+      for (int i = 0; i < kSensorStreamCount; ++i) {
+        device_->request(static_cast<SensorStream>(i), publishers_[i]->subscribed());
+      }
     }
     // Wall time: diagnostics are wanted most when nothing drives a simulated clock.
     timer_ = node.createWallTimer(ros::WallDuration(0.5),

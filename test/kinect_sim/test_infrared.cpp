@@ -55,21 +55,26 @@ TEST(Infrared, AChessboardsCornersAreFoundWhereTheyAre) {
   const Eigen::Vector3d x(-std::sin(yaw), std::cos(yaw), 0);
   const Eigen::Vector3d facing(std::cos(yaw), std::sin(yaw), 0);
   const Eigen::Vector3d y = std::cos(tilt) * Eigen::Vector3d::UnitZ() - std::sin(tilt) * facing;
-  double worst = 0.0, sum = 0.0;
+  // A millimetre before the point it hangs at.
+  const Eigen::Vector3d middle = Eigen::Vector3d(1.5, 0.1, 0.6) + 0.001 * x.cross(y);
+  double worst = 0.0;
+  Eigen::Vector2d sum(0, 0);
   for (const cv::Point2f& corner : corners) {
-    double nearest = 1e9;
+    Eigen::Vector2d nearest(1e9, 0);
     for (int row = 0; row < 6; ++row) {
       for (int column = 0; column < 8; ++column) {
-        const Eigen::Vector3d p =
-            Eigen::Vector3d(1.5, 0.1, 0.6) + x * 0.05 * (column - 3.5) + y * 0.05 * (row - 2.5);
-        nearest = std::min(nearest, (project(simulator, p) - Eigen::Vector2d(corner.x, corner.y)).norm());
+        const Eigen::Vector3d p = middle + x * 0.05 * (column - 3.5) + y * 0.05 * (row - 2.5);
+        const Eigen::Vector2d difference = Eigen::Vector2d(corner.x, corner.y) - project(simulator, p);
+        if (difference.norm() < nearest.norm()) nearest = difference;
       }
     }
-    worst = std::max(worst, nearest);
+    worst = std::max(worst, nearest.norm());
     sum += nearest;
   }
-  EXPECT_LT(sum / static_cast<double>(corners.size()), 0.1);
+  // Rays every half pixel place an edge within 0.25 px, a corner within 0.36; the detector adds its own. Nothing may be
+  // left of it in the mean.
   EXPECT_LT(worst, 0.5);
+  EXPECT_LT((sum / static_cast<double>(corners.size())).norm(), 0.05);
 }
 
 TEST(Infrared, TheMarkerIsADarkRingAboutABrightDiscStraightAhead) {

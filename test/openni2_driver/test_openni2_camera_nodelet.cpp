@@ -1,6 +1,7 @@
 // The nodelet and the plain node on the virtual device: what arrives on the topics.
 
 #include <diagnostic_msgs/DiagnosticArray.h>
+#include <dynamic_reconfigure/Reconfigure.h>
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 #include <sensor_msgs/CameraInfo.h>
@@ -155,6 +156,53 @@ TEST_F(OpenNI2Camera, ThePlainNodeDoesTheSame) {
   ASSERT_TRUE(spin_until([&] { return depth.images.size() >= 5; }, 8.0));
   EXPECT_EQ(wrong_pixels(*depth.images.back()), 0);
   EXPECT_EQ(depth.images.back()->header.frame_id, "my_depth");
+}
+
+TEST_F(OpenNI2Camera, ACalibrationOfTheIrCameraServesBothStreams) {
+  sensor_msgs::CameraInfoConstPtr depth, ir;
+  const auto depth_subscriber = node_.subscribe<sensor_msgs::CameraInfo>(
+      "plain/camera/depth/camera_info", 10, [&](const sensor_msgs::CameraInfoConstPtr& info) { depth = info; });
+  const auto ir_subscriber = node_.subscribe<sensor_msgs::CameraInfo>(
+      "plain/camera/ir/camera_info", 10, [&](const sensor_msgs::CameraInfoConstPtr& info) { ir = info; });
+  ASSERT_TRUE(spin_until([&] { return depth && ir; }, 10.0));
+  // ir_calibration.yaml, and for depth its principal point moved by the Kinect's (5, 4) px.
+  EXPECT_EQ(ir->K[0], 590.0);
+  EXPECT_EQ(ir->K[2], 322.5);
+  EXPECT_EQ(ir->K[5], 242.5);
+  ASSERT_EQ(ir->D.size(), 5U);
+  EXPECT_EQ(ir->D[0], -0.1);
+  EXPECT_EQ(depth->K[4], 591.0);
+  EXPECT_EQ(depth->K[2], 317.5);
+  EXPECT_EQ(depth->P[6], 238.5);
+  EXPECT_EQ(depth->D, ir->D);
+}
+
+TEST_F(OpenNI2Camera, IsReconfiguredWhileItRuns) {
+  Listener depth(node_, "camera/depth/image_raw");
+  ASSERT_TRUE(spin_until([&] { return depth.images.size() >= 5; }, 8.0));
+  const auto reconfigure = [](int width, int height, double offset_s) {
+    dynamic_reconfigure::Reconfigure call;
+    call.request.config.ints.resize(2);
+    call.request.config.ints[0].name = "width_px";
+    call.request.config.ints[0].value = width;
+    call.request.config.ints[1].name = "height_px";
+    call.request.config.ints[1].value = height;
+    call.request.config.doubles.resize(1);
+    call.request.config.doubles[0].name = "depth_time_offset";
+    call.request.config.doubles[0].value = offset_s;
+    return ros::service::call("openni2_camera/set_parameters", call);
+  };
+  ASSERT_TRUE(reconfigure(320, 240, -0.7));
+  const auto newest_is = [&](uint32_t width) { return !depth.images.empty() && depth.images.back()->width == width; };
+  ASSERT_TRUE(spin_until([&] { return newest_is(320); }, 5.0));
+  EXPECT_GT(depth.arrivals_s.back() - depth.images.back()->header.stamp.toSec(), 0.69);
+  // What is changed is seen in the parameters, as dynamic_reconfigure's users expect.
+  int width = 0;
+  EXPECT_TRUE(ros::param::get("openni2_camera/width_px", width));
+  EXPECT_EQ(width, 320);
+  ASSERT_TRUE(reconfigure(640, 480, -0.033));
+  EXPECT_TRUE(spin_until([&] { return newest_is(640); }, 5.0));
+  EXPECT_EQ(wrong_pixels(*depth.images.back()), 0);
 }
 
 TEST_F(OpenNI2Camera, IsBackSoonAfterUnpluggingAndSaysSo) {
