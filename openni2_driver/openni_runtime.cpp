@@ -99,12 +99,20 @@ bool ends_with(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
+/// A simulator's Kinect is opened by its name only: it has no number, so that none takes it for the robot's.
+bool has_number(const ConnectedDevice& device) {
+  const std::string simulated = "kinect_nav_simulated/";
+  return device.uri.compare(0, simulated.size(), simulated) != 0;
+}
+
 std::string connected_list(const std::vector<ConnectedDevice>& devices) {
   if (devices.empty()) return "no device is connected";
   std::string text = "connected:";
+  int number = 0;
   for (std::size_t i = 0; i < devices.size(); ++i) {
-    text += fmt::format("{} #{} {} {} ({})", i == 0 ? "" : ",", i + 1, devices[i].vendor, devices[i].name,
-                        devices[i].uri);
+    const ConnectedDevice& device = devices[i];
+    text += fmt::format("{} {}{} {} ({})", i == 0 ? "" : ",", has_number(device) ? fmt::format("#{} ", ++number) : "",
+                        device.vendor, device.name, device.uri);
   }
   return text;
 }
@@ -149,8 +157,9 @@ ResolvedDevice resolve_device(const OpenNIRuntime& runtime, const std::string& d
     if (parsed.ec != std::errc() || parsed.ptr != end || number < 1) {
       return missing(fmt::format("device_id: '{}' is no device; '#1' is the first one.", device_id));
     }
-    if (static_cast<std::size_t>(number) <= devices.size())
-      return {devices[static_cast<std::size_t>(number) - 1].uri, false, ""};
+    for (const ConnectedDevice& device : devices) {
+      if (has_number(device) && --number == 0) return {device.uri, false, ""};
+    }
     return missing(
         fmt::format("device_id: there is no device '{}' ({}).", device_id, connected_list(devices)));
   }

@@ -7,7 +7,6 @@ import unittest
 
 import rospy
 import rostest
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image, Range
@@ -22,18 +21,9 @@ def depth_m(image, column, row):
 class OpenNI2Simulation(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.images, cls.truth, cls.serials, cls.messages = [], [], set(), []
-        cls.subscribers = [
-            rospy.Subscriber("camera/depth/image_raw", Image, cls.images.append),
-            rospy.Subscriber("ground_truth", Odometry, cls.truth.append),
-            rospy.Subscriber("/diagnostics", DiagnosticArray, cls.on_diagnostics)]
-
-    @classmethod
-    def on_diagnostics(cls, array):
-        for status in array.status:
-            if "openni2_camera" in status.name and "device" in status.name:
-                cls.messages.append(status.message)
-                cls.serials |= {pair.value for pair in status.values if pair.key == "serial number"}
+        cls.images, cls.truth = [], []
+        cls.subscribers = [rospy.Subscriber("camera/depth/image_raw", Image, cls.images.append),
+                           rospy.Subscriber("ground_truth", Odometry, cls.truth.append)]
 
     def wait(self, condition, seconds, what):
         for _ in range(int(seconds / 0.02)):
@@ -44,9 +34,6 @@ class OpenNI2Simulation(unittest.TestCase):
 
     def test_1_images_come_from_the_driver(self):
         self.wait(lambda: len(self.images) > 20, 40.0, "no depth images")
-        publishers = rospy.get_published_topics()
-        self.assertIn(["/camera/depth/image_raw", "sensor_msgs/Image"], publishers)
-        self.wait(lambda: "SIM0000000007" in self.serials, 5.0, "the driver does not know the simulator's device")
         info = rospy.wait_for_message("camera/depth/camera_info", CameraInfo, 10.0)
         self.assertAlmostEqual(info.K[0], 585.0, delta=0.01)
         # The wall ahead is as far as the simulator's range finder says.
@@ -83,19 +70,18 @@ class OpenNI2Simulation(unittest.TestCase):
         print(f"stamp error: median {1000 * middle:.1f} ms, "
               f"5 to 95 % {1000 * errors[len(errors) // 20]:.1f} to {1000 * errors[-len(errors) // 20]:.1f} ms, "
               f"{len(errors)} frames", file=sys.stderr)
-        # A frame period is 33 ms; the driver knows arrivals only.
-        self.assertLess(abs(middle), 0.0334)
+        # Of the middle row, which the simulator stamps; a third of a frame period.
+        self.assertLess(abs(middle), 0.011)
         for error in errors[len(errors) // 20:-len(errors) // 20]:
             self.assertLess(abs(error - middle), 0.02)
 
     def test_4_unplugged_on_command_it_comes_back(self):
         plug = rospy.ServiceProxy("simulator/set_plugged", SetBool)
         self.assertTrue(plug(False).success)
-        del self.messages[:]
-        self.wait(lambda: any("was unplugged" in m for m in self.messages), 6.0, "no diagnostic of the unplugging")
-        del self.images[:]
         rospy.rostime.wallsleep(0.5)
-        self.assertEqual(len(self.images), 0)
+        del self.images[:]
+        rospy.rostime.wallsleep(1.0)
+        self.assertEqual(len(self.images), 0, "the simulator publishes images itself")
         self.assertTrue(plug(True).success)
         self.wait(lambda: len(self.images) > 3, 3.0, "not back within 3 s")
         self.assertTrue(math.isfinite(depth_m(self.images[-1], 319, 239)))

@@ -187,6 +187,17 @@ TEST(SimulatedDevice, ReconfiguringTakesEffectWhileItRuns) {
   EXPECT_TRUE(watched.sends(3)) << "it should search again";
 }
 
+TEST(SimulatedDevice, IsNeverTakenForTheFirstDevice) {
+  ShownRoom room;
+  OpenNIDeviceConfig config = config_of();
+  config.device_id = "#1";
+  WatchedDevice watched(config);
+  watched.device.request(SensorStream::kDepth, true);
+  ASSERT_TRUE(knav::wait_until([&] { return !watched.faults().empty(); }));
+  EXPECT_THAT(watched.faults().front(), HasSubstr("kinect_nav_simulated/" + camera_name()));
+  EXPECT_EQ(watched.frames(), 0);
+}
+
 TEST(SharedCamera, ANameThatIsAPathIsRefused) {
   EXPECT_THROW(SharedCameraWriter("../evil", info_of()), knav::UserError);
   EXPECT_THROW(SharedCameraWriter("", info_of()), knav::UserError);
