@@ -1,6 +1,7 @@
 // The device a simulator shows, through the real OpenNI2 runtime. The test plays the simulator.
 
 #include <gmock/gmock.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 
 #include <atomic>
@@ -139,6 +140,7 @@ TEST(SimulatedDevice, AKilledSimulatorCountsAsUnpluggedAndItsNameIsFree) {
   const std::string name = camera_name("killed");
   const pid_t child = fork();
   if (child == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);  // it never outlives the test
     SharedCameraWriter writer(name, info_of());
     const char told = 1;
     if (write(ready[1], &told, 1) != 1) _exit(1);
