@@ -66,7 +66,7 @@ TEST_F(KinectV1Test, RawDisparityArrivesAsMillimetresThenTheEndOfTheDumpIsAnUnpl
   config.enable_reconnect = false;
   WatchedDevice watched(config, true);
   watched.device.request(SensorStream::kDepth, true);
-  ASSERT_TRUE(watched.reaches(DeviceState::kEnded, 8.0)) << watched.device.status().problem;
+  ASSERT_TRUE(watched.reaches(DeviceState::kEnded, 20.0)) << watched.device.status().problem;
   EXPECT_THAT(watched.device.status().problem, HasSubstr("was unplugged"));
   EXPECT_EQ(watched.device.status().name, "Kinect v1");
   EXPECT_EQ(watched.device.status().uri, "kinect_v1/#1");

@@ -3,6 +3,8 @@
 #include <OpenNI.h>
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "virtual_device_fixture.h"
 
 using knav::DeviceState;
@@ -14,7 +16,7 @@ using testing::HasSubstr;
 
 namespace {
 
-/// Records for a while; returns the indices of the depth frames that came in the meantime.
+/// Records for a while from the first frame on; returns the indices of the depth frames that came in the meantime.
 std::vector<int> record(const std::string& path, double seconds) {
   std::vector<int> indices;
   auto runtime = knav::OpenNIRuntime::acquire();
@@ -27,11 +29,14 @@ std::vector<int> record(const std::string& path, double seconds) {
   EXPECT_EQ(recorder.attach(depth), openni::STATUS_OK);
   EXPECT_EQ(recorder.start(), openni::STATUS_OK);
   EXPECT_EQ(depth.start(), openni::STATUS_OK);
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-  while (std::chrono::steady_clock::now() < end) {
+  const auto now = [] { return std::chrono::steady_clock::now(); };
+  const auto give_up = now() + std::chrono::seconds(10);
+  auto end = give_up;
+  while (now() < end) {
     openni::VideoStream* streams[] = {&depth};
     int ready = 0;
-    if (openni::OpenNI::waitForAnyStream(streams, 1, &ready, 500) != openni::STATUS_OK) break;
+    if (openni::OpenNI::waitForAnyStream(streams, 1, &ready, 500) != openni::STATUS_OK) continue;
+    if (indices.empty()) end = std::min(give_up, now() + std::chrono::milliseconds(std::lround(1000 * seconds)));
     openni::VideoFrameRef frame;
     depth.readFrame(&frame);
     indices.push_back(frame.getFrameIndex());
