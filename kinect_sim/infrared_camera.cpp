@@ -12,9 +12,8 @@ constexpr std::uint32_t kNoiseCount = 1u << 17;
 
 PinholeModel fine(const PinholeModel& camera) {
   constexpr int k = InfraredCamera::kFine;
-  return {camera.width_px * k,       camera.height_px * k,
-          camera.fx_px * k,          camera.fy_px * k,
-          (camera.cx_px + 0.5) * k - 0.5, (camera.cy_px + 0.5) * k - 0.5};
+  return {camera.width_px * k, camera.height_px * k,           camera.fx_px * k,
+          camera.fy_px * k,    (camera.cx_px + 0.5) * k - 0.5, (camera.cy_px + 0.5) * k - 0.5};
 }
 
 }  // namespace
@@ -26,7 +25,8 @@ PinholeModel InfraredCamera::camera_of(const PinholeModel& depth_camera) {
   return camera;
 }
 
-InfraredCamera::InfraredCamera(const WorldMeshes& meshes, const PinholeModel& depth_camera, std::uint64_t seed)
+InfraredCamera::InfraredCamera(const WorldMeshes& meshes, const PinholeModel& depth_camera,
+                               std::uint64_t seed)
     : fine_camera_(fine(camera_of(depth_camera))),
       renderer_(meshes, fine_camera_),
       seed_(seed),

@@ -7,13 +7,14 @@
 
 namespace knav {
 
-/// The Kinect's IR image, 10 bits, its projector covered and a lamp beside the camera, as for a calibration: a picture
-/// to find chessboards and markers in, not a radiometric model. Each pixel is the mean of four rays, and white noise
-/// is added. The camera is the depth image's, its principal point moved as in a Kinect, whose depth image is shifted
-/// against its IR image. Deterministic by (seed, frame).
+/// The Kinect's IR image, 10 bits, its projector covered and a lamp beside the camera, as for a calibration:
+/// a picture to find chessboards and markers in, not a radiometric model. Each pixel is the mean of four
+/// rays, and white noise is added. The camera is the depth image's, its principal point moved as in a Kinect,
+/// whose depth image is shifted against its IR image. Deterministic by (seed, frame).
 class InfraredCamera {
  public:
-  static constexpr double kOffsetX_px = 5.0, kOffsetY_px = 4.0;  ///< IR image's principal point minus the depth's
+  static constexpr double kOffsetX_px = 5.0,
+                          kOffsetY_px = 4.0;  ///< IR image's principal point minus the depth's
 
   InfraredCamera(const WorldMeshes& meshes, const PinholeModel& depth_camera, std::uint64_t seed);
   static PinholeModel camera_of(const PinholeModel& depth_camera);

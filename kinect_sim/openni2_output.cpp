@@ -33,7 +33,8 @@ void OpenNI2Output::render(Simulator& simulator, const FrameRequest& request) {
       std::llround((request.stamp_s - simulator.config().start_time_s + kDeviceZero_s) * 1e6));
   for (const SharedStream stream : {SharedStream::kDepth, SharedStream::kInfrared}) {
     if (!writer_.wanted(stream)) continue;
-    cv::Mat image(simulator.camera().height_px, simulator.camera().width_px, CV_16UC1, writer_.begin_frame(stream));
+    cv::Mat image(simulator.camera().height_px, simulator.camera().width_px, CV_16UC1,
+                  writer_.begin_frame(stream));
     if (stream == SharedStream::kDepth) {
       simulator.render(request, &image);
     } else {

@@ -7,8 +7,8 @@
 
 namespace knav {
 
-/// The simulated Kinect as an OpenNI2 device: renders what the driver wants into the memory it shares with it.
-/// render() belongs to the thread that renders; the others to any.
+/// The simulated Kinect as an OpenNI2 device: renders what the driver wants into the memory it shares with
+/// it. render() belongs to the thread that renders; the others to any.
 class OpenNI2Output {
  public:
   /// UserError if there is such a device already. The device's URI is kinect_nav_simulated/NAME.

@@ -12,10 +12,11 @@ constexpr double kThickness_m = 0.001;  ///< before the wall it hangs on, so tha
 /// Where a panel hangs. In its own frame x points right and y up as seen from its front, z out of it.
 Eigen::Isometry3d read_place(YamlMap& map) {
   const Point2 at = map.point("at");
-  const double yaw = map.number("yaw_deg", -360, 360) * kDegree, tilt = map.number("tilt_deg", -80, 80, 0.0) * kDegree;
+  const double yaw = map.number("yaw_deg", -360, 360) * kDegree,
+               tilt = map.number("tilt_deg", -80, 80, 0.0) * kDegree;
   const double height = map.number("height_m", 0, 20);
-  // Facing yaw: x_world = R(yaw) (0, -1, 0) would be to the left of one who looks out of it, right of one who looks
-  // at it.
+  // Facing yaw: x_world = R(yaw) (0, -1, 0) would be to the left of one who looks out of it, right of one who
+  // looks at it.
   Eigen::Matrix3d R_facing_panel;
   R_facing_panel << 0, 0, 1, 1, 0, 0, 0, 1, 0;
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
@@ -30,7 +31,8 @@ void add(const Eigen::Isometry3d& T, const std::vector<Point2>& corners, Materia
          std::vector<Panel>* panels) {
   Panel panel;
   panel.material = material;
-  for (const Point2& corner : corners) panel.corners.push_back(T * Eigen::Vector3d(corner.x_m, corner.y_m, 0.0));
+  for (const Point2& corner : corners)
+    panel.corners.push_back(T * Eigen::Vector3d(corner.x_m, corner.y_m, 0.0));
   panels->push_back(panel);
 }
 
@@ -43,7 +45,8 @@ void add_rectangle(const Eigen::Isometry3d& T, double x0, double y0, double x1, 
 
 void read_chessboard(YamlMap& map, std::vector<Panel>* panels) {
   const Eigen::Isometry3d T = read_place(map);
-  const int columns = static_cast<int>(map.number("columns", 3, 40)), rows = static_cast<int>(map.number("rows", 3, 40));
+  const int columns = static_cast<int>(map.number("columns", 3, 40)),
+            rows = static_cast<int>(map.number("rows", 3, 40));
   const double square = map.number("square_m", 0.005, 0.5), margin = map.number("margin_m", 0.0, 1.0, square);
   map.text("name", "");
   map.finish();
@@ -51,8 +54,8 @@ void read_chessboard(YamlMap& map, std::vector<Panel>* panels) {
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       const double x = left + column * square, y = low + row * square;
-      add_rectangle(T, x, y, x + square, y + square, (row + column) % 2 == 0 ? Material::kInk : Material::kPaper,
-                    panels);
+      add_rectangle(T, x, y, x + square, y + square,
+                    (row + column) % 2 == 0 ? Material::kInk : Material::kPaper, panels);
     }
   }
   if (margin <= 0.0) return;

@@ -41,7 +41,8 @@ class CameraPublisher {
   SensorStream stream_;
   std::string frame_id_;
   DeviceClock clock_;
-  mutable std::mutex mutex_;  // of the settings; and a subscriber may come while the topics are being advertised
+  mutable std::mutex
+      mutex_;  // of the settings; and a subscriber may come while the topics are being advertised
   Settings settings_;
   ros::Publisher image_, info_;
 };

@@ -1,4 +1,5 @@
-// measure_unplugging: pulls the cable of a simulated Kinect again and again under the driver and counts what it costs.
+// measure_unplugging: pulls the cable of a simulated Kinect again and again under the driver and counts what
+// it costs.
 
 #include <dirent.h>
 #include <fmt/format.h>
@@ -22,9 +23,12 @@
 namespace {
 
 constexpr char kHelp[] =
-    "Shows a simulated Kinect, reads its depth and IR through OpenNI2 and the driver, pulls its cable for a while, plugs "
-    "it in again, and so on. Tells how soon frames are back, and what file descriptors, threads and memory the process "
-    "has after each time. Fails if frames are not back in time, come wrong, or descriptors or threads pile up.";
+    "Shows a simulated Kinect, reads its depth and IR through OpenNI2 and the driver, pulls its cable for a "
+    "while, plugs "
+    "it in again, and so on. Tells how soon frames are back, and what file descriptors, threads and memory "
+    "the process "
+    "has after each time. Fails if frames are not back in time, come wrong, or descriptors or threads pile "
+    "up.";
 
 double steady_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -34,7 +38,8 @@ void sleep_s(double seconds) {
   const double end_s = steady_s() + seconds;
   while (steady_s() < end_s) {
     knav::stop_if_interrupted();
-    std::this_thread::sleep_for(std::chrono::duration<double>(std::min(0.02, std::max(0.0, end_s - steady_s()))));
+    std::this_thread::sleep_for(
+        std::chrono::duration<double>(std::min(0.02, std::max(0.0, end_s - steady_s()))));
   }
 }
 
@@ -104,11 +109,13 @@ class Frames {
  public:
   void take(const knav::SensorFrame& frame) {
     if (frame.stream == knav::SensorStream::kDepth) {
-      const std::size_t pixels = static_cast<std::size_t>(frame.width_px) * static_cast<std::size_t>(frame.height_px);
+      const std::size_t pixels =
+          static_cast<std::size_t>(frame.width_px) * static_cast<std::size_t>(frame.height_px);
       got_.resize(pixels);
       expected_.resize(pixels);
       copy_pixels(frame, got_.data());
-      room_.render_depth(static_cast<uint64_t>(frame.index), {frame.width_px, frame.height_px}, expected_.data());
+      room_.render_depth(static_cast<uint64_t>(frame.index), {frame.width_px, frame.height_px},
+                         expected_.data());
       for (std::size_t i = 0; i < pixels; ++i) wrong_pixels_ += got_[i] != expected_[i] ? 1 : 0;
     }
     ++count_[static_cast<int>(frame.stream)];
@@ -131,11 +138,17 @@ int main(int argc, char** argv) {
   int cycles = 10;
   double away_s = 5.0, stay_s = 1.0, limit_s = 3.0;
   std::string out = "-";
-  app.add_option("--cycles", cycles, "How often the cable is pulled")->check(CLI::Range(1, 100000))->capture_default_str();
-  app.add_option("--away-s", away_s, "Unplugged for so long [s]")->check(CLI::Range(0.05, 3600.0))->capture_default_str();
+  app.add_option("--cycles", cycles, "How often the cable is pulled")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  app.add_option("--away-s", away_s, "Unplugged for so long [s]")
+      ->check(CLI::Range(0.05, 3600.0))
+      ->capture_default_str();
   app.add_option("--stay-s", stay_s, "Plugged in for so long once frames are back [s]")
-      ->check(CLI::Range(0.05, 3600.0))->capture_default_str();
-  app.add_option("--limit-s", limit_s, "Frames must be back so soon after plugging in [s]")->capture_default_str();
+      ->check(CLI::Range(0.05, 3600.0))
+      ->capture_default_str();
+  app.add_option("--limit-s", limit_s, "Frames must be back so soon after plugging in [s]")
+      ->capture_default_str();
   app.add_option("--out", out, "JSON file to write; - is standard output")->capture_default_str();
   return knav::run_command(app, argc, argv, [&] {
     const std::string name = fmt::format("measure_{}", getpid());
@@ -152,7 +165,8 @@ int main(int argc, char** argv) {
       const double start_s = steady_s();
       while (frames.both() == before) {
         if (steady_s() - start_s > seconds) {
-          throw knav::UserError(fmt::format("No frames after {:.1f} s: {}", seconds, device.status().problem));
+          throw knav::UserError(
+              fmt::format("No frames after {:.1f} s: {}", seconds, device.status().problem));
         }
         sleep_s(0.002);
       }
@@ -180,32 +194,33 @@ int main(int argc, char** argv) {
     }
     const Footprint after;
     const auto status = device.status();
-    const nlohmann::json report = {
-        {"cycles", cycles},
-        {"away_s", away_s},
-        {"limit_s", limit_s},
-        {"slowest_back_after_s", slowest_s},
-        {"disconnections", status.disconnections},
-        {"recoveries", status.recoveries},
-        {"wrong_depth_pixels", frames.wrong_pixels()},
-        {"file_descriptors_before", before.file_descriptors},
-        {"file_descriptors_after", after.file_descriptors},
-        {"threads_before", before.threads},
-        {"threads_after", after.threads},
-        {"resident_bytes_before", before.resident_bytes},
-        {"resident_bytes_after", after.resident_bytes},
-        {"rounds", rounds}};
+    const nlohmann::json report = {{"cycles", cycles},
+                                   {"away_s", away_s},
+                                   {"limit_s", limit_s},
+                                   {"slowest_back_after_s", slowest_s},
+                                   {"disconnections", status.disconnections},
+                                   {"recoveries", status.recoveries},
+                                   {"wrong_depth_pixels", frames.wrong_pixels()},
+                                   {"file_descriptors_before", before.file_descriptors},
+                                   {"file_descriptors_after", after.file_descriptors},
+                                   {"threads_before", before.threads},
+                                   {"threads_after", after.threads},
+                                   {"resident_bytes_before", before.resident_bytes},
+                                   {"resident_bytes_after", after.resident_bytes},
+                                   {"rounds", rounds}};
     knav::write_json(out, report.dump(2));
     if (slowest_s > limit_s) {
-      throw knav::UserError(fmt::format("Frames were back only {:.2f} s after plugging in (--limit-s {}).", slowest_s, limit_s));
+      throw knav::UserError(fmt::format("Frames were back only {:.2f} s after plugging in (--limit-s {}).",
+                                        slowest_s, limit_s));
     }
     if (status.disconnections != cycles || frames.wrong_pixels() > 0) {
-      throw knav::UserError(fmt::format("{} of {} unpluggings noticed, {} wrong pixels.", status.disconnections, cycles,
-                                        frames.wrong_pixels()));
+      throw knav::UserError(fmt::format("{} of {} unpluggings noticed, {} wrong pixels.",
+                                        status.disconnections, cycles, frames.wrong_pixels()));
     }
     if (after.file_descriptors > before.file_descriptors || after.threads > before.threads) {
-      throw knav::UserError(fmt::format("{} file descriptors became {}, {} threads {}.", before.file_descriptors,
-                                        after.file_descriptors, before.threads, after.threads));
+      throw knav::UserError(fmt::format("{} file descriptors became {}, {} threads {}.",
+                                        before.file_descriptors, after.file_descriptors, before.threads,
+                                        after.threads));
     }
   });
 }

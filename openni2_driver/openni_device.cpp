@@ -186,10 +186,9 @@ bool OpenNIDevice::open() {
   if (!was_stalled) {
     reported_.clear();
     const char* when = was_lost ? " {:.1f} s after it was lost" : " after {:.1f} s of waiting";
-    tell(false,
-         fmt::format("Opened {} {}, serial number {} ({}){}.", session_->vendor(), session_->name(),
-                     session_->serial().empty() ? "unknown" : session_->serial(), session_->uri(),
-                     was_lost || away_s > 1.0 ? fmt::format(fmt::runtime(when), away_s) : ""));
+    tell(false, fmt::format("Opened {} {}, serial number {} ({}){}.", session_->vendor(), session_->name(),
+                            session_->serial().empty() ? "unknown" : session_->serial(), session_->uri(),
+                            was_lost || away_s > 1.0 ? fmt::format(fmt::runtime(when), away_s) : ""));
   }
   return true;
 }
@@ -306,7 +305,7 @@ void OpenNIDevice::run() {
       lost_ = true;
       close(ended_ ? DeviceState::kEnded : DeviceState::kSearching,
             uri + (ended_ ? ": was unplugged, and enable_reconnect is false."
-                         : ": was unplugged. Waiting for it."));
+                          : ": was unplugged. Waiting for it."));
     } else if (session_->at_end_of_file() && !config_.playback_repeat) {
       ended_ = true;
       close(DeviceState::kEnded, uri + ": the recording is at its end.");

@@ -30,7 +30,7 @@ struct DeviceStatus {
   int openings = 0;
   int disconnections = 0;
   int stalls = 0;
-  int recoveries = 0;          ///< times frames (or, if nobody wants any, the device) were back after a loss or stall
+  int recoveries = 0;  ///< times frames (or, if nobody wants any, the device) were back after a loss or stall
   double waited_s = 0.0;       ///< from the start to the first opening, or until now
   double last_outage_s = 0.0;  ///< from the last loss or stall to its recovery, or until now
   std::string last_event;      ///< the last sentence told to the event handler

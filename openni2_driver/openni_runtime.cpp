@@ -111,8 +111,9 @@ std::string connected_list(const std::vector<ConnectedDevice>& devices) {
   int number = 0;
   for (std::size_t i = 0; i < devices.size(); ++i) {
     const ConnectedDevice& device = devices[i];
-    text += fmt::format("{} {}{} {} ({})", i == 0 ? "" : ",", has_number(device) ? fmt::format("#{} ", ++number) : "",
-                        device.vendor, device.name, device.uri);
+    text += fmt::format("{} {}{} {} ({})", i == 0 ? "" : ",",
+                        has_number(device) ? fmt::format("#{} ", ++number) : "", device.vendor, device.name,
+                        device.uri);
   }
   return text;
 }

@@ -7,8 +7,8 @@
 
 namespace knav {
 
-/// Visitor that sets the fields of a config struct which a dynamic_reconfigure message names, and leaves the others
-/// alone. Names and ranges of the .cfg file must be the struct's; a test compares them.
+/// Visitor that sets the fields of a config struct which a dynamic_reconfigure message names, and leaves the
+/// others alone. Names and ranges of the .cfg file must be the struct's; a test compares them.
 class ReconfigureReader {
  public:
   explicit ReconfigureReader(const dynamic_reconfigure::Config& message) : message_(message) {}

@@ -54,7 +54,9 @@ struct SharedCameraLayout {
   std::atomic<uint32_t> plugged;
   Stream streams[kSharedStreamCount];
 
-  std::size_t pixels() const { return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px); }
+  std::size_t pixels() const {
+    return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
+  }
   uint16_t* frame(int stream, uint32_t slot) {
     auto* first = reinterpret_cast<uint16_t*>(reinterpret_cast<char*>(this) + sizeof(SharedCameraLayout));
     return first + pixels() * (static_cast<std::size_t>(stream) * kSlots + slot);
@@ -72,7 +74,8 @@ std::string path_of(const std::string& name) { return std::string(kDirectory) + 
 
 std::size_t bytes_of(int width_px, int height_px) {
   return sizeof(SharedCameraLayout) + sizeof(uint16_t) * kSlots * kSharedStreamCount *
-                                          static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
+                                          static_cast<std::size_t>(width_px) *
+                                          static_cast<std::size_t>(height_px);
 }
 
 /// Null if it is not there or not ours. The file may be one that another process is just making.
@@ -101,7 +104,8 @@ SharedCameraLayout* map_existing(const std::string& path, std::size_t* bytes) {
 SharedCameraWriter::SharedCameraWriter(const std::string& name, const SharedCameraInfo& info)
     : path_(path_of(name)), info_(info) {
   if (name.empty() || name.find('/') != std::string::npos || name.size() > 100) {
-    throw UserError(fmt::format("'{}' is no name for a simulated camera; letters, digits and '_' make one.", name));
+    throw UserError(
+        fmt::format("'{}' is no name for a simulated camera; letters, digits and '_' make one.", name));
   }
   if (SharedCameraLayout* other = map_existing(path_, &bytes_)) {
     // One that was killed is silent only after a while, but gone at once.
@@ -109,7 +113,8 @@ SharedCameraWriter::SharedCameraWriter(const std::string& name, const SharedCame
     munmap(other, bytes_);
     if (alive) {
       throw UserError(fmt::format(
-          "another simulator shows its camera as '{}' ({}); give this one another name or end that one.", name, path_));
+          "another simulator shows its camera as '{}' ({}); give this one another name or end that one.",
+          name, path_));
     }
   }
   bytes_ = bytes_of(info.width_px, info.height_px);
@@ -203,8 +208,8 @@ uint32_t SharedCameraReader::newest(SharedStream stream) const {
 
 void SharedCameraReader::wait_newer(SharedStream stream, uint32_t seen) const {
   timespec timeout{0, 20000000};
-  syscall(SYS_futex, reinterpret_cast<uint32_t*>(&layout_->streams[static_cast<int>(stream)].newest), FUTEX_WAIT, seen,
-          &timeout, nullptr, 0);
+  syscall(SYS_futex, reinterpret_cast<uint32_t*>(&layout_->streams[static_cast<int>(stream)].newest),
+          FUTEX_WAIT, seen, &timeout, nullptr, 0);
 }
 
 bool SharedCameraReader::copy(SharedStream which, uint32_t number, uint16_t* out, Stamp* stamp) const {
@@ -212,7 +217,8 @@ bool SharedCameraReader::copy(SharedStream which, uint32_t number, uint16_t* out
   if (slot.number.load(std::memory_order_acquire) != number) return false;
   stamp->time_us = slot.time_us;
   stamp->index = slot.index;
-  std::memcpy(out, layout_->frame(static_cast<int>(which), number % kSlots), layout_->pixels() * sizeof(uint16_t));
+  std::memcpy(out, layout_->frame(static_cast<int>(which), number % kSlots),
+              layout_->pixels() * sizeof(uint16_t));
   std::atomic_thread_fence(std::memory_order_seq_cst);
   return slot.number.load(std::memory_order_relaxed) == number;
 }

@@ -8,9 +8,9 @@
 
 namespace knav {
 
-/// The memory in which a simulator shows its Kinect to the OpenNI2 driver plugin of any process of the same user:
-/// a file /dev/shm/kinect_nav_camera.NAME with a short ring of frames for each stream. Nothing in it can be left
-/// locked: whoever dies, the other notices by the stopped clock.
+/// The memory in which a simulator shows its Kinect to the OpenNI2 driver plugin of any process of the same
+/// user: a file /dev/shm/kinect_nav_camera.NAME with a short ring of frames for each stream. Nothing in it
+/// can be left locked: whoever dies, the other notices by the stopped clock.
 struct SharedCameraLayout;
 
 enum class SharedStream { kDepth = 0, kInfrared = 1 };
@@ -34,7 +34,8 @@ class SharedCameraWriter {
   SharedCameraWriter(const SharedCameraWriter&) = delete;
   SharedCameraWriter& operator=(const SharedCameraWriter&) = delete;
 
-  /// To be called at least every kSharedCameraTimeoutS / 4; a camera whose writer is silent counts as unplugged.
+  /// To be called at least every kSharedCameraTimeoutS / 4; a camera whose writer is silent counts as
+  /// unplugged.
   void keep_alive();
   /// Whether any reader wants frames of this stream now.
   bool wanted(SharedStream stream) const;

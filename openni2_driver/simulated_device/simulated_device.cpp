@@ -62,7 +62,8 @@ void SimulatedStream::run() {
 
 SimulatedDevice::SimulatedDevice(std::shared_ptr<SharedCameraReader> camera)
     : PluginDevice(camera->info().serial), camera_(std::move(camera)) {
-  for (const OniSensorType type : {ONI_SENSOR_DEPTH, ONI_SENSOR_IR}) add_sensor(type, modes_of(type, camera_->info()));
+  for (const OniSensorType type : {ONI_SENSOR_DEPTH, ONI_SENSOR_IR})
+    add_sensor(type, modes_of(type, camera_->info()));
 }
 
 oni::driver::StreamBase* SimulatedDevice::createStream(OniSensorType type) {

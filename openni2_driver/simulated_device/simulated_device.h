@@ -8,7 +8,8 @@
 
 namespace knav {
 
-/// One stream of a simulator's Kinect: the frames of the shared memory, with the simulator's time as the device's.
+/// One stream of a simulator's Kinect: the frames of the shared memory, with the simulator's time as the
+/// device's.
 class SimulatedStream final : public PluginStream {
  public:
   SimulatedStream(OniSensorType type, std::shared_ptr<SharedCameraReader> camera);

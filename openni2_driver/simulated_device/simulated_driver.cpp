@@ -33,7 +33,8 @@ class SimulatedDriver final : public oni::driver::DriverBase {
   oni::driver::DeviceBase* deviceOpen(const char* uri, const char* /*mode*/) override {
     const std::string prefix = kUriPrefix, text = uri;
     std::shared_ptr<SharedCameraReader> camera;
-    if (text.compare(0, prefix.size(), prefix) == 0) camera = SharedCameraReader::open(text.substr(prefix.size()));
+    if (text.compare(0, prefix.size(), prefix) == 0)
+      camera = SharedCameraReader::open(text.substr(prefix.size()));
     if (camera) return new SimulatedDevice(camera);
     getServices().errorLoggerAppend("no simulator shows the camera '%s' now", uri);
     return nullptr;

@@ -1,4 +1,5 @@
-// The simulated IR image: chessboards and markers where projection puts them, as a calibration will look for them.
+// The simulated IR image: chessboards and markers where projection puts them, as a calibration will look for
+// them.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,7 +15,8 @@ namespace {
 constexpr char kBoardWorld[] =
     "spawn: [0, 0, 0]\n"
     "walls:\n  - {points: [[3.05, -5], [3.05, 5]], thickness_m: 0.1}\n"
-    "chessboards:\n  - {at: [1.5, 0.1], yaw_deg: 160, tilt_deg: 15, height_m: 0.6, columns: 9, rows: 7, square_m: 0.05}\n";
+    "chessboards:\n  - {at: [1.5, 0.1], yaw_deg: 160, tilt_deg: 15, height_m: 0.6, columns: 9, rows: 7, "
+    "square_m: 0.05}\n";
 
 cv::Mat infrared_of(Simulator& simulator) {
   FrameRequest request;
@@ -36,7 +38,8 @@ SimulatorConfig still_config() {
   return config;
 }
 
-/// Where a point of the world [m] lies in the IR image, worked out without the renderer. The robot stands at the origin.
+/// Where a point of the world [m] lies in the IR image, worked out without the renderer. The robot stands at
+/// the origin.
 Eigen::Vector2d project(const Simulator& simulator, const Eigen::Vector3d& p_world) {
   const Eigen::Vector3d p = simulator.T_base_optical().inverse() * p_world;
   const PinholeModel camera = simulator.infrared_camera();
@@ -48,9 +51,10 @@ TEST(Infrared, AChessboardsCornersAreFoundWhereTheyAre) {
   const cv::Mat image = eight_bits(infrared_of(simulator));
   std::vector<cv::Point2f> corners;
   ASSERT_TRUE(cv::findChessboardCorners(image, {8, 6}, corners));
-  cv::cornerSubPix(image, corners, {5, 5}, {-1, -1}, {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 40, 0.001});
-  // By hand: the board faces 160 deg and leans back by 15 deg. Its x axis points to the right of one who looks at it,
-  // its y axis up.
+  cv::cornerSubPix(image, corners, {5, 5}, {-1, -1},
+                   {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 40, 0.001});
+  // By hand: the board faces 160 deg and leans back by 15 deg. Its x axis points to the right of one who
+  // looks at it, its y axis up.
   const double yaw = 160 * kPi / 180, tilt = 15 * kPi / 180;
   const Eigen::Vector3d x(-std::sin(yaw), std::cos(yaw), 0);
   const Eigen::Vector3d facing(std::cos(yaw), std::sin(yaw), 0);
@@ -71,8 +75,8 @@ TEST(Infrared, AChessboardsCornersAreFoundWhereTheyAre) {
     worst = std::max(worst, nearest.norm());
     sum += nearest;
   }
-  // Rays every half pixel place an edge within 0.25 px, a corner within 0.36; the detector adds its own. Nothing may be
-  // left of it in the mean.
+  // Rays every half pixel place an edge within 0.25 px, a corner within 0.36; the detector adds its own.
+  // Nothing may be left of it in the mean.
   EXPECT_LT(worst, 0.5);
   EXPECT_LT((sum / static_cast<double>(corners.size())).norm(), 0.05);
 }
@@ -97,7 +101,8 @@ TEST(Infrared, TheMarkerIsADarkRingAboutABrightDiscStraightAhead) {
 }
 
 TEST(Infrared, SameSeedSameBytesOtherFrameOtherNoise) {
-  Simulator first(parse_world(kBoardWorld, "board"), still_config()), second(parse_world(kBoardWorld, "board"), still_config());
+  Simulator first(parse_world(kBoardWorld, "board"), still_config()),
+      second(parse_world(kBoardWorld, "board"), still_config());
   const cv::Mat a = infrared_of(first), b = infrared_of(second);
   EXPECT_EQ(cv::norm(a, b, cv::NORM_INF), 0.0);
   first.step();
@@ -119,7 +124,9 @@ TEST(Infrared, ABoardIsSeenByTheDepthCameraToo) {
 
 TEST(Infrared, AFaultInABoardNamesItsKey) {
   try {
-    parse_world("spawn: [0, 0, 0]\nchessboards:\n  - {at: [1, 0], yaw_deg: 0, height_m: 1, columns: 9, rows: 7}\n", "w.yaml");
+    parse_world(
+        "spawn: [0, 0, 0]\nchessboards:\n  - {at: [1, 0], yaw_deg: 0, height_m: 1, columns: 9, rows: 7}\n",
+        "w.yaml");
     FAIL() << "accepted";
   } catch (const UserError& error) {
     EXPECT_NE(std::string(error.what()).find("square_m"), std::string::npos) << error.what();

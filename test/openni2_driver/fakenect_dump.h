@@ -23,8 +23,9 @@ inline uint16_t code_at(int u, int v, int frame) {
   return static_cast<uint16_t>((v * kWidth + u + 37 * frame) % 2048);
 }
 
-/// An index; for every frame a PGM of raw codes, named by the time and the Kinect's ticks; and between them what the
-/// accelerometer said. The same kDistinctFrames again and again, `frames` in all, at 30 Hz. An old dump is replaced.
+/// An index; for every frame a PGM of raw codes, named by the time and the Kinect's ticks; and between them
+/// what the accelerometer said. The same kDistinctFrames again and again, `frames` in all, at 30 Hz. An old
+/// dump is replaced.
 inline void write_dump(const std::string& directory, int frames) {
   std::filesystem::remove_all(directory);
   std::filesystem::create_directories(directory);
@@ -39,12 +40,13 @@ inline void write_dump(const std::string& directory, int frames) {
     index << name << "\n";
     const std::string path = directory + "/" + name;
     if (frame >= kDistinctFrames) {
-      std::filesystem::create_hard_link(directory + "/" + names[static_cast<std::size_t>(frame % kDistinctFrames)],
-                                        path);
+      std::filesystem::create_hard_link(
+          directory + "/" + names[static_cast<std::size_t>(frame % kDistinctFrames)], path);
     } else {
       std::vector<uint16_t> codes(static_cast<std::size_t>(kWidth * kHeight));
       for (int v = 0; v < kHeight; ++v) {
-        for (int u = 0; u < kWidth; ++u) codes[static_cast<std::size_t>(v * kWidth + u)] = code_at(u, v, frame);
+        for (int u = 0; u < kWidth; ++u)
+          codes[static_cast<std::size_t>(v * kWidth + u)] = code_at(u, v, frame);
       }
       std::ofstream file(path, std::ios::binary);
       file << "P5 640 480 65535\n";

@@ -1,6 +1,6 @@
-// A libfreenect for tests, with what fakenect lacks: serial numbers, the zero plane, IR, and Kinects that come and go.
-// The functions the plugin calls, with libfreenect's own header, names and meanings; the test's LD_LIBRARY_PATH puts
-// it in libfreenect's place.
+// A libfreenect for tests, with what fakenect lacks: serial numbers, the zero plane, IR, and Kinects that
+// come and go. The functions the plugin calls, with libfreenect's own header, names and meanings; the test's
+// LD_LIBRARY_PATH puts it in libfreenect's place.
 
 #include <libfreenect.h>
 #include <libfreenect_registration.h>
@@ -125,7 +125,8 @@ void freenect_free_device_attributes(freenect_device_attributes* list) {
   }
 }
 
-int freenect_open_device_by_camera_serial(freenect_context* context, freenect_device** device, const char* serial) {
+int freenect_open_device_by_camera_serial(freenect_context* context, freenect_device** device,
+                                          const char* serial) {
   if (!is_on_usb(serial)) return -1;
   *device = new freenect_device;
   (*device)->context = context;
@@ -136,7 +137,8 @@ int freenect_open_device_by_camera_serial(freenect_context* context, freenect_de
 int freenect_open_device(freenect_context* context, freenect_device** device, int index) {
   const std::vector<std::string> serials = on_usb();
   if (index < 0 || index >= static_cast<int>(serials.size())) return -1;
-  return freenect_open_device_by_camera_serial(context, device, serials[static_cast<std::size_t>(index)].c_str());
+  return freenect_open_device_by_camera_serial(context, device,
+                                               serials[static_cast<std::size_t>(index)].c_str());
 }
 int freenect_close_device(freenect_device* device) {
   auto& open = device->context->open;
@@ -149,8 +151,12 @@ int freenect_close_device(freenect_device* device) {
 
 void freenect_set_user(freenect_device* device, void* user) { device->user = user; }
 void* freenect_get_user(freenect_device* device) { return device->user; }
-void freenect_set_depth_callback(freenect_device* device, freenect_depth_cb callback) { device->on_depth = callback; }
-void freenect_set_video_callback(freenect_device* device, freenect_video_cb callback) { device->on_video = callback; }
+void freenect_set_depth_callback(freenect_device* device, freenect_depth_cb callback) {
+  device->on_depth = callback;
+}
+void freenect_set_video_callback(freenect_device* device, freenect_video_cb callback) {
+  device->on_video = callback;
+}
 
 int freenect_get_video_mode_count() { return 1; }
 freenect_frame_mode freenect_get_video_mode(int) { return mode_of(false); }
@@ -196,7 +202,8 @@ int freenect_process_events_timeout(freenect_context* context, timeval* timeout)
     if (!is_on_usb(device->serial)) return -1;  // what libusb tells of a transfer to a device that is gone
   }
   const auto now = std::chrono::steady_clock::now();
-  const auto limit = now + std::chrono::seconds(timeout->tv_sec) + std::chrono::microseconds(timeout->tv_usec);
+  const auto limit =
+      now + std::chrono::seconds(timeout->tv_sec) + std::chrono::microseconds(timeout->tv_usec);
   if (context->next_frame > limit) {
     std::this_thread::sleep_until(limit);
     return 0;

@@ -4,9 +4,9 @@
 
 #include "openni2_driver/kinect_v1/disparity.h"
 
-/// What the Kinects of scripted_freenect.cpp show, for the tests that look at it through the plugin. Which are on the
-/// USB is told by a file of serial numbers, named by KINECT_NAV_SCRIPTED_KINECTS and read whenever libfreenect is
-/// asked.
+/// What the Kinects of scripted_freenect.cpp show, for the tests that look at it through the plugin. Which
+/// are on the USB is told by a file of serial numbers, named by KINECT_NAV_SCRIPTED_KINECTS and read whenever
+/// libfreenect is asked.
 namespace knav::scripted {
 
 constexpr int kWidth = 640, kHeight = 480, kInfraredHeight = 488;
@@ -22,7 +22,8 @@ inline uint16_t code(int u, int v, unsigned frame) {
 /// 10 bits; the first pixel tells the frame.
 inline uint16_t infrared(int u, int v, unsigned frame) {
   if (u == 0 && v == 0) return static_cast<uint16_t>(frame % 1024U);
-  return static_cast<uint16_t>((static_cast<unsigned>(u) * 3U + static_cast<unsigned>(v) * 5U + frame) % 1024U);
+  return static_cast<uint16_t>((static_cast<unsigned>(u) * 3U + static_cast<unsigned>(v) * 5U + frame) %
+                               1024U);
 }
 
 constexpr uint32_t kTicksPerFrame = 2000000;  // of a 60 MHz clock

@@ -10,13 +10,13 @@
 #include "virtual_device_fixture.h"
 
 using knav::DeviceState;
+using knav::OpenNIDeviceConfig;
+using knav::SensorStream;
+using knav::WatchedDevice;
 using knav::fakenect::code_at;
 using knav::fakenect::kDistinctFrames;
 using knav::fakenect::kHeight;
 using knav::fakenect::kWidth;
-using knav::OpenNIDeviceConfig;
-using knav::SensorStream;
-using knav::WatchedDevice;
 using testing::HasSubstr;
 
 namespace {

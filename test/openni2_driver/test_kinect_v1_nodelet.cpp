@@ -1,4 +1,5 @@
-// A recorded Kinect v1 from libfreenect's fakenect through the plugin, the OpenNI2 runtime and the nodelet to the topic.
+// A recorded Kinect v1 from libfreenect's fakenect through the plugin, the OpenNI2 runtime and the nodelet to
+// the topic.
 
 #include <gtest/gtest.h>
 #include <ros/ros.h>
@@ -19,9 +20,11 @@ TEST(KinectV1Nodelet, DepthImageRawIsExactInMillimetres) {
   std::vector<sensor_msgs::ImageConstPtr> images;
   sensor_msgs::CameraInfoConstPtr info;
   const auto image_subscriber = node.subscribe<sensor_msgs::Image>(
-      "camera/depth/image_raw", 100, [&](const sensor_msgs::ImageConstPtr& image) { images.push_back(image); });
+      "camera/depth/image_raw", 100,
+      [&](const sensor_msgs::ImageConstPtr& image) { images.push_back(image); });
   const auto info_subscriber = node.subscribe<sensor_msgs::CameraInfo>(
-      "camera/depth/camera_info", 100, [&](const sensor_msgs::CameraInfoConstPtr& message) { info = message; });
+      "camera/depth/camera_info", 100,
+      [&](const sensor_msgs::CameraInfoConstPtr& message) { info = message; });
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(25.0);
   while (ros::ok() && ros::WallTime::now() < end && images.size() < 45) {
     ros::spinOnce();
@@ -29,12 +32,14 @@ TEST(KinectV1Nodelet, DepthImageRawIsExactInMillimetres) {
   }
   ASSERT_GE(images.size(), 45U);
 
-  // The formula, worked out here once more: similar triangles over the nominal zero plane, 7.5 cm, 120 cm, 0.1042 cm.
+  // The formula, worked out here once more: similar triangles over the nominal zero plane, 7.5 cm, 120 cm,
+  // 0.1042 cm.
   std::vector<uint16_t> mm_of_code(2048, 0);
   for (int code = 0; code < 2047; ++code) {
     const double shift_cm = ((code - 800) / 4.0 - 0.375) * 0.1042;
     const double mm = 10.0 * (120.0 + 120.0 * shift_cm / (7.5 - shift_cm));
-    if (shift_cm < 7.5 && mm >= 400.0 && mm <= 26000.0) mm_of_code[static_cast<std::size_t>(code)] = static_cast<uint16_t>(std::lround(mm));
+    if (shift_cm < 7.5 && mm >= 400.0 && mm <= 26000.0)
+      mm_of_code[static_cast<std::size_t>(code)] = static_cast<uint16_t>(std::lround(mm));
   }
   int farthest_mm = 0, refused = 0;
   for (const auto& image : images) {
@@ -59,7 +64,8 @@ TEST(KinectV1Nodelet, DepthImageRawIsExactInMillimetres) {
   }
   EXPECT_GT(farthest_mm, 20000);
   EXPECT_GT(refused, 0);
-  for (std::size_t i = 1; i < images.size(); ++i) EXPECT_GT(images[i]->header.stamp, images[i - 1]->header.stamp);
+  for (std::size_t i = 1; i < images.size(); ++i)
+    EXPECT_GT(images[i]->header.stamp, images[i - 1]->header.stamp);
   ASSERT_TRUE(info);
   EXPECT_NEAR(info->K[0], 120.0 / (2 * 0.1042), 0.01);
 }

@@ -1,5 +1,6 @@
-// The Kinect v1 plugin in the real runtime, over a libfreenect with serial numbers, IR and a USB that the test holds
-// (scripted_freenect.cpp); fakenect has none of these. Run by ctest, which puts the folders on LD_LIBRARY_PATH.
+// The Kinect v1 plugin in the real runtime, over a libfreenect with serial numbers, IR and a USB that the
+// test holds (scripted_freenect.cpp); fakenect has none of these. Run by ctest, which puts the folders on
+// LD_LIBRARY_PATH.
 
 #include <gmock/gmock.h>
 
@@ -88,7 +89,8 @@ TEST_F(KinectV1UsbTest, InfraredIsTheUpper480RowsBesideDepth) {
     const unsigned frame = image.pixels[0];
     int wrong = 0;
     for (int i = 0; i < 640 * 480; ++i) {
-      wrong += image.pixels[static_cast<std::size_t>(i)] != scripted::infrared(i % 640, i / 640, frame) ? 1 : 0;
+      wrong +=
+          image.pixels[static_cast<std::size_t>(i)] != scripted::infrared(i % 640, i / 640, frame) ? 1 : 0;
     }
     EXPECT_EQ(wrong, 0);
     ++checked;

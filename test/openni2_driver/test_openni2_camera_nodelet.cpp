@@ -161,7 +161,8 @@ TEST_F(OpenNI2Camera, ThePlainNodeDoesTheSame) {
 TEST_F(OpenNI2Camera, ACalibrationOfTheIrCameraServesBothStreams) {
   sensor_msgs::CameraInfoConstPtr depth, ir;
   const auto depth_subscriber = node_.subscribe<sensor_msgs::CameraInfo>(
-      "plain/camera/depth/camera_info", 10, [&](const sensor_msgs::CameraInfoConstPtr& info) { depth = info; });
+      "plain/camera/depth/camera_info", 10,
+      [&](const sensor_msgs::CameraInfoConstPtr& info) { depth = info; });
   const auto ir_subscriber = node_.subscribe<sensor_msgs::CameraInfo>(
       "plain/camera/ir/camera_info", 10, [&](const sensor_msgs::CameraInfoConstPtr& info) { ir = info; });
   ASSERT_TRUE(spin_until([&] { return depth && ir; }, 10.0));
@@ -193,7 +194,9 @@ TEST_F(OpenNI2Camera, IsReconfiguredWhileItRuns) {
     return ros::service::call("openni2_camera/set_parameters", call);
   };
   ASSERT_TRUE(reconfigure(320, 240, -0.7));
-  const auto newest_is = [&](uint32_t width) { return !depth.images.empty() && depth.images.back()->width == width; };
+  const auto newest_is = [&](uint32_t width) {
+    return !depth.images.empty() && depth.images.back()->width == width;
+  };
   ASSERT_TRUE(spin_until([&] { return newest_is(320); }, 5.0));
   EXPECT_GT(depth.arrivals_s.back() - depth.images.back()->header.stamp.toSec(), 0.69);
   // What is changed is seen in the parameters, as dynamic_reconfigure's users expect.

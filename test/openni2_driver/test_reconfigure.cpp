@@ -37,8 +37,8 @@ class Comparison {
 
  private:
   template <class Entries, class Value>
-  void ranged(const Entries& defaults, const Entries& lows, const Entries& highs, const char* name, Value value,
-              Value low, Value high, const char* unit, const char* text) {
+  void ranged(const Entries& defaults, const Entries& lows, const Entries& highs, const char* name,
+              Value value, Value low, Value high, const char* unit, const char* text) {
     for (std::size_t i = 0; i < defaults.size(); ++i) {
       if (defaults[i].name != name) continue;
       EXPECT_EQ(defaults[i].value, value) << name;

@@ -33,7 +33,8 @@ SharedCameraInfo info_of() {
 /// A simulator that shows the room whose every pixel has a formula.
 class ShownRoom {
  public:
-  explicit ShownRoom(const std::string& name = camera_name()) : writer(name, info_of()), thread_([this] { run(); }) {}
+  explicit ShownRoom(const std::string& name = camera_name())
+      : writer(name, info_of()), thread_([this] { run(); }) {}
   ~ShownRoom() {
     stop_ = true;
     thread_.join();
