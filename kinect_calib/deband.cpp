@@ -1,5 +1,6 @@
 #include "kinect_calib/deband.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,9 +10,11 @@
 namespace knav {
 namespace {
 
-constexpr int kSide = 12;  // columns on either side that a step is judged by
-constexpr double kSmallest =
-    0.12 * kInverseDepthPerCode;  // a column's median over 480 rows is good to 0.03 codes
+constexpr int kSide = 24;   // columns on either side that a step is judged by
+constexpr int kBlocks = 6;  // of rows: a band's step is the same in all, the lens's error is not
+constexpr double kSmallest = 0.2 * kInverseDepthPerCode;
+constexpr double kSignificant = 4.0;  // standard errors
+constexpr int kSmoothTerms = 3;
 
 /// Without the outermost 3 % on either side. Not a median, nor the middle half: with noise of half a code
 /// these follow the staircase of the codes, the mean does not.
@@ -41,34 +44,67 @@ double line_at(const std::vector<double>& values, int first, int count, double a
   return y / n + slope * (at - x / n);
 }
 
+double median_of_steps(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 }  // namespace
+
+/// Mean inverse depth per column of some rows.
+void Debander::average_columns(const cv::Mat& depth_m, int first_row, int last_row) {
+  column_per_m_.assign(static_cast<std::size_t>(depth_m.cols), std::numeric_limits<double>::quiet_NaN());
+  for (int u = 0; u < depth_m.cols; ++u) {
+    values_.clear();
+    for (int v = first_row; v < last_row; ++v) {
+      const float z = depth_m.at<float>(v, u);
+      if (z > 0.0f) values_.push_back(1.0f / z);
+    }
+    if (values_.size() < static_cast<std::size_t>(last_row - first_row) / 2 + 1) continue;
+    column_per_m_[static_cast<std::size_t>(u)] = trimmed_mean(&values_);
+  }
+}
+
+/// What a line on the right says at a boundary, less what a line on the left says: mean over the blocks of
+/// rows, and its standard error, the typical one of the frame.
+void Debander::measure_steps(const cv::Mat& depth_m) {
+  const auto size = static_cast<std::size_t>(depth_m.cols);
+  std::vector<double> sum(size, 0.0), squares(size, 0.0), count(size, 0.0);
+  for (int block = 0; block < kBlocks; ++block) {
+    average_columns(depth_m, depth_m.rows * block / kBlocks, depth_m.rows * (block + 1) / kBlocks);
+    for (int u = kSide; u + kSide <= depth_m.cols; ++u) {
+      const double step =
+          line_at(column_per_m_, u, kSide, u - 0.5) - line_at(column_per_m_, u - kSide, kSide, u - 0.5);
+      if (std::isnan(step)) continue;
+      const auto i = static_cast<std::size_t>(u);
+      sum[i] += step;
+      squares[i] += step * step;
+      count[i] += 1.0;
+    }
+  }
+  step_per_m_.assign(size, 0.0);
+  std::vector<double> errors;
+  for (std::size_t u = 0; u < size; ++u) {
+    if (count[u] < 2.0) continue;
+    step_per_m_[u] = sum[u] / count[u];
+    const double variance = (squares[u] - sum[u] * sum[u] / count[u]) / (count[u] - 1.0);
+    errors.push_back(std::sqrt(std::max(0.0, variance) / count[u]));
+  }
+  error_per_m_ = errors.empty() ? 0.0 : median_of_steps(errors);
+}
 
 int Debander::remove_bands(cv::Mat* depth_m) {
   const int width = depth_m->cols;
   const auto size = static_cast<std::size_t>(width);
-  column_per_m_.assign(size, std::numeric_limits<double>::quiet_NaN());
-  for (int u = 0; u < width; ++u) {
-    values_.clear();
-    for (int v = 0; v < depth_m->rows; ++v) {
-      const float z = depth_m->at<float>(v, u);
-      if (z > 0.0f) values_.push_back(1.0f / z);
-    }
-    if (values_.size() < static_cast<std::size_t>(depth_m->rows) / 8 + 1) continue;
-    column_per_m_[static_cast<std::size_t>(u)] = trimmed_mean(&values_);
-  }
-  // What a line on the right says at a boundary, less what a line on the left says.
-  step_per_m_.assign(size, 0.0);
-  for (int u = kSide; u + kSide <= width; ++u) {
-    const double step =
-        line_at(column_per_m_, u, kSide, u - 0.5) - line_at(column_per_m_, u - kSide, kSide, u - 0.5);
-    step_per_m_[static_cast<std::size_t>(u)] = std::isnan(step) ? 0.0 : step;
-  }
+  measure_steps(*depth_m);
+  const double smallest = std::max(kSmallest, kSignificant * error_per_m_);
   band_per_m_.assign(size, 0.0);
-  double level = 0.0, mean = 0.0;
+  double level = 0.0;
   int steps = 0;
   for (int u = 0; u < width; ++u) {
     const double step = step_per_m_[static_cast<std::size_t>(u)];
-    bool largest = std::abs(step) > kSmallest;
+    bool largest = std::abs(step) > smallest;
     // A line across a step answers with the opposite sign beside it: the largest within a side wins.
     for (int i = std::max(0, u - kSide); largest && i <= std::min(width - 1, u + kSide); ++i) {
       const double other = std::abs(step_per_m_[static_cast<std::size_t>(i)]);
@@ -79,10 +115,9 @@ int Debander::remove_bands(cv::Mat* depth_m) {
       ++steps;
     }
     band_per_m_[static_cast<std::size_t>(u)] = level;
-    mean += level / width;
   }
   if (steps == 0) return 0;
-  for (double& band : band_per_m_) band -= mean;
+  keep_smooth_part();
   for (int v = 0; v < depth_m->rows; ++v) {
     float* row = depth_m->ptr<float>(v);
     for (int u = 0; u < width; ++u) {
@@ -90,6 +125,21 @@ int Debander::remove_bands(cv::Mat* depth_m) {
     }
   }
   return steps;
+}
+
+/// A step that is missed, or wrongly measured, would shift all columns beyond it. Bands alternate; what the
+/// staircase has of a polynomial across the image (its mean first of all) is left in the image.
+void Debander::keep_smooth_part() {
+  const auto width = static_cast<Eigen::Index>(band_per_m_.size());
+  Eigen::MatrixXd terms(width, kSmoothTerms);
+  for (Eigen::Index u = 0; u < width; ++u) {
+    const double x = 2.0 * (static_cast<double>(u) + 0.5) / static_cast<double>(width) - 1.0;
+    terms(u, 0) = 1.0;
+    for (Eigen::Index k = 1; k < kSmoothTerms; ++k) terms(u, k) = terms(u, k - 1) * x;
+  }
+  Eigen::Map<Eigen::VectorXd> band(band_per_m_.data(), width);
+  const Eigen::VectorXd smooth = (terms.transpose() * terms).ldlt().solve(terms.transpose() * band);
+  band -= terms * smooth;
 }
 
 }  // namespace knav

@@ -8,7 +8,7 @@ namespace knav {
 /// Paper section III.B: the sensor's vertical bands (constant offsets of whole groups of columns, which move
 /// with scene and distance) must not be learned. Finds the steps between bands along the horizontal and takes
 /// them out, keeping the frame-wide mean; what changes smoothly across the image, the error to be learned,
-/// stays.
+/// stays. Only steps well above the frame's own noise count: a step invented does more harm than one left in.
 class Debander {
  public:
   /// @param depth_m 32FC1 m of a flat wall, NaN invalid; corrected in place
@@ -18,6 +18,11 @@ class Debander {
   const std::vector<double>& band_per_m() const { return band_per_m_; }
 
  private:
+  void average_columns(const cv::Mat& depth_m, int first_row, int last_row);
+  void measure_steps(const cv::Mat& depth_m);
+  void keep_smooth_part();
+
+  double error_per_m_ = 0.0;
   std::vector<double> column_per_m_, step_per_m_, band_per_m_;
   std::vector<float> values_;
 };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/config.h"
@@ -13,7 +14,7 @@ namespace knav {
 namespace {
 
 constexpr const char* kFormat = "kinect_nav_depth_calibration";
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 
 template <class T>
 T get(const YAML::Node& file, const std::string& path, const char* key) {
@@ -34,11 +35,14 @@ DepthCalibration DepthCalibration::identity(int width_px, int height_px, int til
   calibration.image_height_px = height_px;
   calibration.tile_px = tile_px;
   const std::size_t tiles = calibration.tile_count();
+  calibration.linear_slope.assign(tiles, 0.0);
+  calibration.linear_offset_per_m.assign(tiles, 0.0);
   calibration.inverse_depth_offset_per_m.assign(tiles, 0.0);
   calibration.quadratic_a_per_m.assign(tiles, 0.0);
   calibration.quadratic_b.assign(tiles, 1.0);
   calibration.quadratic_c_m.assign(tiles, 0.0);
   calibration.tile_state.assign(tiles, 0);
+  calibration.tile_trained_max_m.assign(tiles, calibration.trained_max_m);
   return calibration;
 }
 
@@ -61,11 +65,16 @@ std::vector<std::string> DepthCalibration::validate() const {
       }
     }
   };
+  check("linear_slope", linear_slope);
+  check("linear_offset_per_m", linear_offset_per_m);
   check("inverse_depth_offset_per_m", inverse_depth_offset_per_m);
   check("quadratic_a_per_m", quadratic_a_per_m);
   check("quadratic_b", quadratic_b);
   check("quadratic_c_m", quadratic_c_m);
+  check("tile_trained_max_m", tile_trained_max_m);
   if (tile_state.size() != tile_count()) faults.push_back("'tile_state' does not have one value per tile.");
+  if (std::any_of(linear_slope.begin(), linear_slope.end(), [](double s) { return !(std::abs(s) < 0.5); }))
+    faults.push_back("'linear_slope' must lie in -0.5 ... 0.5.");
   if (!(std::abs(inverse_depth_scale) < 0.5))
     faults.push_back("'inverse_depth_scale' must lie in -0.5 ... 0.5.");
   if (!(trained_min_m > 0.0 && trained_max_m > trained_min_m)) {
@@ -80,9 +89,9 @@ DepthCalibration load_depth_calibration(const std::string& path) {
     throw UserError(fmt::format("{}: not a depth calibration (no 'format: {}').", path, kFormat));
   }
   const int version = get<int>(file, path, "version");
-  if (version != kVersion) {
-    throw UserError(
-        fmt::format("{}: has version {}, this program reads {}; calibrate again.", path, version, kVersion));
+  if (version != 1 && version != kVersion) {
+    throw UserError(fmt::format("{}: has version {}, this program reads 1 and {}; calibrate again.", path,
+                                version, kVersion));
   }
   DepthCalibration calibration;
   calibration.device = get<std::string>(file, path, "device");
@@ -97,6 +106,15 @@ DepthCalibration load_depth_calibration(const std::string& path) {
   calibration.quadratic_b = get<std::vector<double>>(file, path, "quadratic_b");
   calibration.quadratic_c_m = get<std::vector<double>>(file, path, "quadratic_c_m");
   calibration.tile_state = get<std::vector<int>>(file, path, "tile_state");
+  if (version == 1) {
+    calibration.linear_offset_per_m = calibration.inverse_depth_offset_per_m;
+    calibration.linear_slope.assign(calibration.linear_offset_per_m.size(), calibration.inverse_depth_scale);
+    calibration.tile_trained_max_m.assign(calibration.linear_offset_per_m.size(), calibration.trained_max_m);
+  } else {
+    calibration.linear_slope = get<std::vector<double>>(file, path, "linear_slope");
+    calibration.linear_offset_per_m = get<std::vector<double>>(file, path, "linear_offset_per_m");
+    calibration.tile_trained_max_m = get<std::vector<double>>(file, path, "tile_trained_max_m");
+  }
   std::vector<std::string> faults = calibration.validate();
   for (std::string& fault : faults) fault = path + ": " + fault;
   if (!faults.empty()) throw_faults(faults);
@@ -117,10 +135,13 @@ void save_depth_calibration(const std::string& path, const DepthCalibration& cal
       text += fmt::format("{}{:.7g}", i > 0 ? ", " : "", values[i]);
     text += "]\n";
   };
+  list("linear_slope", calibration.linear_slope);
+  list("linear_offset_per_m", calibration.linear_offset_per_m);
   list("inverse_depth_offset_per_m", calibration.inverse_depth_offset_per_m);
   list("quadratic_a_per_m", calibration.quadratic_a_per_m);
   list("quadratic_b", calibration.quadratic_b);
   list("quadratic_c_m", calibration.quadratic_c_m);
+  list("tile_trained_max_m", calibration.tile_trained_max_m);
   text += fmt::format("tile_state: [{}]\n", fmt::join(calibration.tile_state, ", "));
   write_text_atomically(path, text);
 }

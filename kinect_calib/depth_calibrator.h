@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -7,6 +8,9 @@
 #include "core/camera_model.h"
 #include "kinect_calib/deband.h"
 #include "kinect_calib/depth_calibration.h"
+#include "kinect_calib/disparity_fit.h"
+#include "kinect_calib/wall_measurement.h"
+#include "kinect_calib/wall_tiles.h"
 
 namespace knav {
 
@@ -18,10 +22,10 @@ struct DepthCalibratorConfig {
   /// Only readings within this share of the distance, growing with it as the sensor's error does, are the
   /// wall's.
   double wall_gate = 0.03, wall_gate_per_m = 0.02;
-  double sensor_sd_per_m = 3e-4;  ///< of a tile's mean in inverse depth, once noise is averaged away
+  double wall_tilt_sd = 0.01;  ///< how far one wall is off square beside what all have in common (tangent)
 };
 
-/// What one wall distance says about a calibration.
+/// What one wall distance says about a calibration, for one of depth_correction's models.
 struct WallScore {
   double distance_m = 0.0;
   int frames = 0;
@@ -32,8 +36,8 @@ struct WallScore {
 };
 
 /// Learns the depth error of a sensor from frames of a flat wall at known distances (paper section III.B):
-/// bands are removed per frame, frames averaged per tile, and per tile an offset in inverse depth and the
-/// paper's quadratic fitted.
+/// bands are removed per frame, frames averaged per tile, and every model that depth_correction knows is
+/// fitted.
 class DepthCalibrator {
  public:
   explicit DepthCalibrator(const DepthCalibratorConfig& config) : config_(config) {}
@@ -49,37 +53,28 @@ class DepthCalibrator {
   DepthCalibration fit();
   /// After fit(): tiles that neighbours had to fill in.
   int filled_tiles() const { return filled_tiles_; }
-  /// How the frames added fare under a calibration, nearest wall first.
+  /// After fit(): of those, the ones whose readings fit no smooth error.
+  int wild_tiles() const { return wild_tiles_; }
+  /// After fit(): tiles whose quadratic had to be held from bending back.
+  int held_quadratics() const { return held_quadratics_; }
+  /// The walls added, nearest first after fit(), on tiles of 16 px.
+  const std::vector<WallMeasurement>& walls() const { return walls_; }
+  /// How the frames added fare under a calibration, nearest wall first, on tiles of 16 px.
   std::vector<WallScore> score(const DepthCalibration& calibration) const;
 
  private:
-  struct Wall {
-    double distance_m = 0.0;
-    int frames = 0;
-    std::vector<double> inverse_per_m, count;  // per tile, summed over frames
-    double tilt_x = 0.0, tilt_y = 0.0;         // 1 / z = (1 + tilt_x x + tilt_y y) / distance
-    bool has(std::size_t tile) const { return count[tile] > 0.0; }
-    double measured_per_m(std::size_t tile) const { return inverse_per_m[tile] / count[tile]; }
-  };
-  void average_tiles();
-  void keep_wall_tiles(double distance_m);
-  double true_per_m(const Wall& wall, std::size_t tile) const;
-  double weight(const Wall& wall) const;
-  void fit_scale_and_tilts(DepthCalibration* calibration);
-  void fit_offsets(DepthCalibration* calibration) const;
-  void fit_quadratics(DepthCalibration* calibration) const;
-  void mend_tiles(DepthCalibration* calibration);
+  DisparityPriors priors() const;
+  void add_to(const std::vector<double>& per_m, double distance_m, std::vector<WallMeasurement>* walls);
 
   DepthCalibratorConfig config_;
   PinholeModel camera_;
-  DepthCalibration layout_;
-  std::vector<double> tile_x_, tile_y_;  // normalised image coordinates of the tile centres
-  std::vector<Wall> walls_;
+  TileGrid grid_, fine_grid_;  // of 16 px; of config_.tile_px
+  std::unique_ptr<WallTiles> tiles_;
+  std::vector<WallMeasurement> walls_, fine_walls_;  // the second only where tiles are not of 16 px
   Debander debander_;
   cv::Mat frame_;
-  std::vector<double> frame_per_m_;  // per tile
-  bool offsets_known_ = false;
-  int filled_tiles_ = 0;
+  std::vector<double> per_m_;
+  int filled_tiles_ = 0, wild_tiles_ = 0, held_quadratics_ = 0;
 };
 
 }  // namespace knav

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/multiversion.h"
+#include "kinect_calib/disparity_fit.h"
 
 namespace knav {
 namespace {
@@ -57,30 +58,30 @@ void correct_offset(float* z_m, int count, float scale, const float* offset, Gua
 }
 
 KNAV_MULTIVERSION
+void correct_linear(float* z_m, int count, const float* scale, const float* offset, Guard guard) {
+  for (int i = 0; i < count; ++i) z_m[i] = by_offset(z_m[i], scale[i], offset[i], guard);
+}
+
+KNAV_MULTIVERSION
 void correct_quadratic(float* z_m, int count, const float* a, const float* b, const float* c, Guard guard) {
   for (int i = 0; i < count; ++i) z_m[i] = by_quadratic(z_m[i], a[i], b[i], c[i], guard);
 }
 
-/// Bilinear between tile centres, constant outside the outermost ones.
-double interpolate_tiles(const DepthCalibration& calibration, const std::vector<double>& values, double u,
-                         double v) {
-  const double column = std::clamp((u + 0.5) / calibration.tile_px - 0.5, 0.0, calibration.columns() - 1.0);
-  const double row = std::clamp((v + 0.5) / calibration.tile_px - 0.5, 0.0, calibration.rows() - 1.0);
-  const int c0 = static_cast<int>(column), r0 = static_cast<int>(row);
-  const int c1 = std::min(c0 + 1, calibration.columns() - 1), r1 = std::min(r0 + 1, calibration.rows() - 1);
-  const double s = column - c0, t = row - r0;
-  const auto at = [&](int r, int c) {
-    return values[static_cast<std::size_t>(r * calibration.columns() + c)];
-  };
-  return (1 - t) * ((1 - s) * at(r0, c0) + s * at(r0, c1)) + t * ((1 - s) * at(r1, c0) + s * at(r1, c1));
+TileGrid grid_of(const DepthCalibration& calibration) {
+  TileGrid grid;
+  grid.columns = calibration.columns();
+  grid.rows = calibration.rows();
+  grid.tile_px = calibration.tile_px;
+  return grid;
 }
 
 std::vector<float> per_pixel(const DepthCalibration& calibration, const std::vector<double>& values) {
+  const TileGrid grid = grid_of(calibration);
   std::vector<float> pixels;
   pixels.reserve(static_cast<std::size_t>(calibration.image_width_px * calibration.image_height_px));
   for (int v = 0; v < calibration.image_height_px; ++v) {
     for (int u = 0; u < calibration.image_width_px; ++u) {
-      pixels.push_back(static_cast<float>(interpolate_tiles(calibration, values, u, v)));
+      pixels.push_back(static_cast<float>(interpolate_tiles(grid, values, u, v)));
     }
   }
   return pixels;
@@ -107,6 +108,10 @@ void DepthCorrector::set_calibration(const DepthCalibration& calibration) {
     pixel_a_ = per_pixel(calibration_, calibration_.quadratic_a_per_m);
     pixel_b_ = per_pixel(calibration_, calibration_.quadratic_b);
     pixel_c_ = per_pixel(calibration_, calibration_.quadratic_c_m);
+  } else if (config_.model == "default") {
+    pixel_offset_ = per_pixel(calibration_, calibration_.linear_offset_per_m);
+    pixel_scale_ = per_pixel(calibration_, calibration_.linear_slope);
+    for (float& scale : pixel_scale_) scale += 1.0f;
   } else {
     pixel_offset_ = per_pixel(calibration_, calibration_.inverse_depth_offset_per_m);
   }
@@ -160,6 +165,8 @@ bool DepthCorrector::correct(const cv::Mat& depth, const RawCamera& camera, cv::
     if (config_.model == "paper") {
       correct_quadratic(row, width, pixel_a_.data() + first, pixel_b_.data() + first, pixel_c_.data() + first,
                         guard);
+    } else if (config_.model == "default") {
+      correct_linear(row, width, pixel_scale_.data() + first, pixel_offset_.data() + first, guard);
     } else {
       correct_offset(row, width, static_cast<float>(1.0 + calibration_.inverse_depth_scale),
                      pixel_offset_.data() + first, guard);
@@ -172,12 +179,17 @@ double DepthCorrector::correct_depth_m(double u_px, double v_px, double depth_m)
   if (uncalibrated_) return depth_m;
   const Guard guard = {static_cast<float>(1.0 / config_.ratio_max), static_cast<float>(config_.ratio_max)};
   const auto z = static_cast<float>(depth_m);
+  const TileGrid grid = grid_of(calibration_);
   const auto at = [&](const std::vector<double>& values) {
-    return static_cast<float>(interpolate_tiles(calibration_, values, u_px, v_px));
+    return static_cast<float>(interpolate_tiles(grid, values, u_px, v_px));
   };
   if (config_.model == "paper") {
     return by_quadratic(z, at(calibration_.quadratic_a_per_m), at(calibration_.quadratic_b),
                         at(calibration_.quadratic_c_m), guard);
+  }
+  if (config_.model == "default") {
+    return by_offset(z, static_cast<float>(1.0f + at(calibration_.linear_slope)),
+                     at(calibration_.linear_offset_per_m), guard);
   }
   return by_offset(z, static_cast<float>(1.0 + calibration_.inverse_depth_scale),
                    at(calibration_.inverse_depth_offset_per_m), guard);

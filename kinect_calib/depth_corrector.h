@@ -19,8 +19,9 @@ struct DepthCorrectionConfig {
   void visit(Visitor& v) {
     v.text("calibration_file", calibration_file,
            "YAML written by calibrate_depth; empty: depth passes uncorrected.");
-    v.choice("model", model, {"paper", "default"},
-             "paper: quadratic in depth per tile. default: offset in disparity, which extrapolates.");
+    v.choice("model", model, {"paper", "offset", "default"},
+             "paper: quadratic in depth per tile. offset: offset in disparity per tile. default: offset and "
+             "slope in disparity per tile.");
     v.number("ratio_max", ratio_max, 1.01, 4, "",
              "Guard: a depth is never changed by more than this factor.");
   }
@@ -59,7 +60,8 @@ class DepthCorrector {
   bool uncalibrated_ = true;
   RectificationTable table_;
   cv::Mat raw_metres_;
-  std::vector<float> pixel_offset_;                 // default model: one per pixel
+  std::vector<float> pixel_offset_;                 // offset and default: one per pixel
+  std::vector<float> pixel_scale_;                  // default
   std::vector<float> pixel_a_, pixel_b_, pixel_c_;  // paper
   RawCamera undistorted_;
   std::string fault_;

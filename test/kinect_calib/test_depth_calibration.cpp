@@ -212,10 +212,10 @@ TEST(DepthCalibration, FileKeepsEveryValueAndFaultsNameFileAndKey) {
 TEST(DepthCorrector, RisesWithDepthAndStaysWithinItsBoundsUnderWildTiles) {
   DepthCalibration wild = DepthCalibration::identity(640, 480, 16);
   for (std::size_t i = 0; i < wild.tile_count(); ++i) {
-    wild.inverse_depth_offset_per_m[i] = i % 2 == 0 ? -0.5 : 0.5;
+    wild.linear_offset_per_m[i] = wild.inverse_depth_offset_per_m[i] = i % 2 == 0 ? -0.5 : 0.5;
     wild.quadratic_a_per_m[i] = i % 2 == 0 ? 1.0 : 0.05;
   }
-  for (const char* model : {"default", "paper"}) {
+  for (const char* model : {"default", "offset", "paper"}) {
     DepthCorrectionConfig config;
     config.model = model;
     const DepthCorrector corrector(config, wild);
@@ -234,7 +234,7 @@ TEST(DepthCorrector, RisesWithDepthAndStaysWithinItsBoundsUnderWildTiles) {
 
 TEST(DepthCorrector, InterpolatesSmoothlyBetweenTileCentres) {
   DepthCalibration calibration = DepthCalibration::identity(640, 480, 16);
-  calibration.inverse_depth_offset_per_m[5 * 40 + 10] = 0.01;  // centre at (167.5, 87.5)
+  calibration.linear_offset_per_m[5 * 40 + 10] = 0.01;  // centre at (167.5, 87.5)
   const DepthCorrector corrector(DepthCorrectionConfig{}, calibration);
   EXPECT_NEAR(corrector.correct_depth_m(167.5, 87.5, 5.0), 5.0 / 1.05, 1e-5);
   EXPECT_NEAR(corrector.correct_depth_m(175.5, 87.5, 5.0), 5.0 / 1.025, 1e-5);
