@@ -14,7 +14,7 @@ constexpr int kSide = 24;   // columns on either side that a step is judged by
 constexpr int kBlocks = 6;  // of rows: a band's step is the same in all, the lens's error is not
 constexpr double kSmallest = 0.2 * kInverseDepthPerCode;
 constexpr double kSignificant = 4.0;  // standard errors
-constexpr int kSmoothTerms = 3;
+constexpr int kSmoothTerms = 4;
 
 /// Without the outermost 3 % on either side. Not a median, nor the middle half: with noise of half a code
 /// these follow the staircase of the codes, the mean does not.

@@ -231,7 +231,8 @@ DisparityField refit_disparity(const TileGrid& grid, const DisparityPriors& prio
     Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper> solver;
     solver.setTolerance(1e-7);
     solver.setMaxIterations(500);
-    solver.compute(normal.matrix());
+    const Eigen::SparseMatrix<double> matrix = normal.matrix();  // the solver keeps a reference
+    solver.compute(matrix);
     solution = solver.solveWithGuess(normal.right_side(), solution);
     set_field(solution, grid.count(), &field);
   }

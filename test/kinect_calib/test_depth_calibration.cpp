@@ -158,14 +158,30 @@ TEST(Debander, RemovesStepsAndKeepsTheSmoothError) {
   cv::Mat depth = wall(2.0, 4, banded);
   Debander debander;
   EXPECT_EQ(debander.remove_bands(&depth), 7);  // 640 / 83 columns
+  // At each edge between bands, of 0.8 codes: what 16 columns on the right say less 16 on the left.
   const cv::Mat clean = wall(2.0, 4, {});
-  for (const int u : {20, 120, 330, 600}) {
-    double with = 0.0, without = 0.0;
-    for (int v = 0; v < 480; ++v) {
-      with += 1.0 / depth.at<float>(v, u) / 480;
-      without += 1.0 / clean.at<float>(v, u) / 480;
+  const auto mean_per_m = [](const cv::Mat& image, int first, int last) {
+    double sum = 0.0;
+    for (int v = 0; v < image.rows; ++v) {
+      for (int u = first; u < last; ++u) sum += 1.0 / image.at<float>(v, u);
     }
-    EXPECT_NEAR(with, without, 0.2 * kInverseDepthPerCode) << u;
+    return sum / (image.rows * (last - first));
+  };
+  for (int edge = 83; edge < 624; edge += 83) {
+    const auto step = [&](const cv::Mat& image) {
+      return mean_per_m(image, edge, edge + 16) - mean_per_m(image, edge - 16, edge);
+    };
+    EXPECT_NEAR(step(depth), step(clean), 0.2 * kInverseDepthPerCode) << edge;
+  }
+  // The frame-wide mean is that of the banded frame.
+  EXPECT_NEAR(mean_per_m(depth, 0, 640), mean_per_m(wall(2.0, 4, banded), 0, 640), 0.01 * kInverseDepthPerCode);
+}
+
+TEST(Debander, LeavesAFrameWithoutBandsAlone) {
+  for (std::uint64_t seed = 1; seed < 6; ++seed) {
+    cv::Mat depth = wall(2.0, seed, {});
+    Debander debander;
+    EXPECT_EQ(debander.remove_bands(&depth), 0) << seed;
   }
 }
 
