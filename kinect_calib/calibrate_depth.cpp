@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/file_io.h"
 #include "core/progress.h"
+#include "kinect_calib/calibration_report.h"
 #include "kinect_calib/depth_calibrator.h"
 #include "kinect_calib/depth_corrector.h"
 #include "kinect_calib/depth_messages.h"
@@ -31,17 +32,18 @@ struct Options {
               range_topic = "range";
   double range_offset_m = 0.0;
   int tile_px = 16;
-  bool keep_bands = false, square = false;
+  bool keep_bands = false, square = false, compare_tiles = false;
 };
 
 const char* const kHelp =
     R"(SOURCE is a folder with distances.csv (lines `file,distance_m`; PNG, 16 bit, mm, 0 invalid) or a bag with depth
 images and a sensor_msgs/Range topic, of which the frames count that were taken standing still. Distances: from the camera to the wall along the optical axis, 0.5 to 4 m in steps
 of 5-15 %, several frames at each.
-The JSON holds device, tile_px, filled_tiles (count), inverse_depth_scale, and the lists training and validation, each
-entry with distance_m, frames (count) and, relative to the distance, mean_bias_before, mean_bias_after,
-mean_bias_after_paper, tile_bias_p95_before, tile_bias_p95_after, tile_bias_p95_after_paper (95th percentile over tiles
-of the absolute bias; paper: the quadratic model).)";
+A --report that ends in .html is a page with pictures (needs python3-matplotlib), any other a table as text.
+The JSON holds device, tile_px, filled_tiles, wild_tiles, held_quadratics (counts), and the lists training and
+validation, each entry with distance_m, frames (count) and, relative to the distance, mean_bias_before, mean_bias_after,
+mean_bias_after_offset, mean_bias_after_paper and the same of tile_bias_p95 (95th percentile over tiles of the absolute
+bias; offset and paper: depth_correction's other models). With --compare-tiles also tiles, the same lists per tile_px.)";
 
 RawCamera default_camera(int width_px, int height_px) {
   RawCamera camera;
@@ -116,26 +118,31 @@ class Loader {
     if (!options.camera_info.empty()) camera_ = read_camera_info(options.camera_info);
   }
 
-  void load(const std::string& source, const std::string& stage, DepthCalibrator* calibrator) {
+  /// Each frame goes to all calibrators.
+  void load(const std::string& source, const std::string& stage,
+            const std::vector<DepthCalibrator*>& calibrators) {
+    calibrators_ = calibrators;
     if (fs::is_directory(source)) {
-      load_folder(source, stage, calibrator);
+      load_folder(source, stage);
     } else {
-      load_bag(source, stage, calibrator);
+      load_bag(source, stage);
     }
   }
 
  private:
-  void add(const std::string& where, const cv::Mat& raw, double distance_m, DepthCalibrator* calibrator) {
+  void add(const std::string& where, const cv::Mat& raw, double distance_m) {
     if (camera_.raw.width_px == 0) camera_ = default_camera(raw.cols, raw.rows);
     if (!corrector_.correct(raw, camera_, &metres_)) throw UserError(where + ": " + corrector_.fault());
     try {
-      calibrator->add_frame(metres_, camera_.rectified, distance_m);
+      for (DepthCalibrator* calibrator : calibrators_) {
+        calibrator->add_frame(metres_, camera_.rectified, distance_m);
+      }
     } catch (const UserError& error) {
       throw UserError(where + ": " + error.what());
     }
   }
 
-  void load_folder(const std::string& folder, const std::string& stage, DepthCalibrator* calibrator) {
+  void load_folder(const std::string& folder, const std::string& stage) {
     const std::vector<Frame> frames = read_distances(folder);
     Progress progress(stage);
     for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -145,12 +152,12 @@ class Loader {
       if (image.empty()) throw UserError(path + ": cannot be read as an image; distances.csv names it.");
       if (image.type() != CV_16UC1)
         throw UserError(path + ": must be a PNG with one channel of 16 bits (mm).");
-      add(path, image, frames[i].distance_m, calibrator);
+      add(path, image, frames[i].distance_m);
       progress.update(static_cast<double>(i + 1) / static_cast<double>(frames.size()), frames[i].file);
     }
   }
 
-  void load_bag(const std::string& path, const std::string& stage, DepthCalibrator* calibrator) {
+  void load_bag(const std::string& path, const std::string& stage) {
     const BagReader bag(path);
     bag.require_topic(options_.depth_topic);
     bag.require_topic(options_.range_topic);
@@ -172,7 +179,7 @@ class Loader {
                      std::string fault;
                      if (!view_depth(*image, &view, &fault)) throw UserError(path + ": " + fault);
                      try {
-                       add(path, view, range_m, calibrator);
+                       add(path, view, range_m);
                        ++used;
                      } catch (const UserError& error) {  // it stood somewhere else for a while
                        ++skipped;
@@ -233,6 +240,7 @@ class Loader {
   DepthCorrector corrector_;
   RawCamera camera_;
   cv::Mat metres_;
+  std::vector<DepthCalibrator*> calibrators_;
 };
 
 nlohmann::json as_json(const std::vector<WallScore>& scores) {
@@ -242,9 +250,11 @@ nlohmann::json as_json(const std::vector<WallScore>& scores) {
                     {"frames", s.frames},
                     {"mean_bias_before", s.mean_bias_before},
                     {"mean_bias_after", s.mean_bias_after},
+                    {"mean_bias_after_offset", s.mean_bias_after_offset},
                     {"mean_bias_after_paper", s.mean_bias_after_paper},
                     {"tile_bias_p95_before", s.tile_bias_p95_before},
                     {"tile_bias_p95_after", s.tile_bias_p95_after},
+                    {"tile_bias_p95_after_offset", s.tile_bias_p95_after_offset},
                     {"tile_bias_p95_after_paper", s.tile_bias_p95_after_paper}});
   }
   return list;
@@ -253,53 +263,86 @@ nlohmann::json as_json(const std::vector<WallScore>& scores) {
 std::string as_table(const std::string& title, const std::vector<WallScore>& scores) {
   std::string text = fmt::format(
       "{}: bias in per cent of the distance\n"
-      "                       frame-wide mean          95th percentile of tiles\n"
-      "distance_m  frames   before   after   paper     before   after   paper\n",
+      "                       frame-wide mean                  95th percentile of tiles\n"
+      "distance_m  frames   before   after  offset   paper     before   after  offset   paper\n",
       title);
   for (const WallScore& s : scores) {
-    text += fmt::format("{:10.3f}  {:6d} {:8.2f} {:7.2f} {:7.2f}   {:8.2f} {:7.2f} {:7.2f}\n", s.distance_m,
-                        s.frames, 100 * s.mean_bias_before, 100 * s.mean_bias_after,
-                        100 * s.mean_bias_after_paper, 100 * s.tile_bias_p95_before,
-                        100 * s.tile_bias_p95_after, 100 * s.tile_bias_p95_after_paper);
+    text += fmt::format("{:10.3f}  {:6d} {:8.2f} {:7.2f} {:7.2f} {:7.2f}   {:8.2f} {:7.2f} {:7.2f} {:7.2f}\n",
+                        s.distance_m, s.frames, 100 * s.mean_bias_before, 100 * s.mean_bias_after,
+                        100 * s.mean_bias_after_offset, 100 * s.mean_bias_after_paper,
+                        100 * s.tile_bias_p95_before, 100 * s.tile_bias_p95_after,
+                        100 * s.tile_bias_p95_after_offset, 100 * s.tile_bias_p95_after_paper);
   }
   return text;
 }
+
+constexpr int kComparedTiles_px[] = {1, 2, 4, 8, 16, 32, 64};  // as the paper did
 
 void calibrate(const Options& options) {
   DepthCalibratorConfig config;
   config.tile_px = options.tile_px;
   config.deband = !options.keep_bands;
   config.fit_wall_tilt = !options.square;
-  Loader loader(options);
   DepthCalibrator training(config);
-  loader.load(options.input, "reading walls", &training);
+  std::vector<std::unique_ptr<DepthCalibrator>> others;
+  std::vector<DepthCalibrator*> all = {&training};
+  if (options.compare_tiles) {
+    for (const int tile_px : kComparedTiles_px) {
+      DepthCalibratorConfig other = config;
+      other.tile_px = tile_px;
+      others.push_back(std::make_unique<DepthCalibrator>(other));
+      all.push_back(others.back().get());
+    }
+  }
+  Loader loader(options);
+  loader.load(options.input, "reading walls", all);
   DepthCalibration calibration = training.fit();
   calibration.device = options.device;
 
   std::string report = fmt::format(
-      "Depth calibration of '{}': {} distances, {:.2f} to {:.2f} m; {} of {} tiles filled from "
-      "neighbours; scale {:+.3f} %\n\n",
+      "Depth calibration of '{}': {} distances, {:.2f} to {:.2f} m; {} of {} tiles filled from neighbours, "
+      "{} of "
+      "them because no smooth error explains them; {} quadratics held from bending back\n\n",
       options.device, training.distances(), calibration.trained_min_m, calibration.trained_max_m,
-      training.filled_tiles(), calibration.tile_count(), 100 * calibration.inverse_depth_scale);
+      training.filled_tiles(), calibration.tile_count(), training.wild_tiles(), training.held_quadratics());
   const std::vector<WallScore> trained = training.score(calibration);
   report += as_table("Training", trained);
   nlohmann::json json = {{"device", options.device},
                          {"tile_px", calibration.tile_px},
                          {"filled_tiles", training.filled_tiles()},
+                         {"wild_tiles", training.wild_tiles()},
+                         {"held_quadratics", training.held_quadratics()},
                          {"inverse_depth_scale", calibration.inverse_depth_scale},
                          {"training", as_json(trained)},
                          {"validation", nlohmann::json::array()}};
+  config.tile_px = WallTiles::kGateTile_px;
+  config.deband = false;  // at run time nobody removes bands
+  DepthCalibrator validation(config);
   if (!options.validate.empty()) {
-    config.deband = false;  // at run time nobody removes bands
-    DepthCalibrator validation(config);
-    loader.load(options.validate, "validating", &validation);
+    loader.load(options.validate, "validating", {&validation});
     const std::vector<WallScore> validated = validation.score(calibration);
     report += "\n" + as_table("Validation", validated);
     json["validation"] = as_json(validated);
   }
+  if (options.compare_tiles) {
+    Progress progress("comparing tile sizes");
+    for (std::size_t i = 0; i < others.size(); ++i) {
+      stop_if_interrupted();
+      progress.update(static_cast<double>(i) / static_cast<double>(others.size()),
+                      fmt::format("{} px", kComparedTiles_px[i]));
+      const DepthCalibration other = others[i]->fit();
+      json["tiles"].push_back({{"tile_px", kComparedTiles_px[i]},
+                               {"training", as_json(others[i]->score(other))},
+                               {"validation", as_json(validation.score(other))}});
+    }
+  }
   save_depth_calibration(options.out, calibration);
-  if (!options.report.empty()) write_text_atomically(options.report, report);
   write_json(options.json, json.dump(2));
+  if (fs::path(options.report).extension() == ".html") {
+    write_calibration_report(options.report, calibration, training, validation, json);
+  } else if (!options.report.empty()) {
+    write_text_atomically(options.report, report);
+  }
   if (options.json != "-")
     fmt::print("{}\nWritten to {}; give it to depth_correction as calibration_file.\n", report, options.out);
 }
@@ -327,7 +370,9 @@ int main(int argc, char** argv) {
                  "bag: added to each range to get the camera's distance [m]");
   app.add_flag("--keep-bands", options.keep_bands, "do not remove vertical bands from each frame");
   app.add_flag("--square", options.square, "the sensor stood exactly square to the wall: fit no tilt");
-  app.add_option("--report", options.report, "write the table to this text file as well");
+  app.add_flag("--compare-tiles", options.compare_tiles,
+               "also calibrate with tiles of 1 to 64 px, and compare");
+  app.add_option("--report", options.report, "write a page (.html) or the table (any other) to this file");
   app.add_option("--json", options.json, "write the figures to this file; '-' for standard output");
   app.footer(knav::kHelp);
   return knav::run_command(app, argc, argv, [&] { knav::calibrate(options); });

@@ -140,40 +140,51 @@ DepthCalibration DepthCalibrator::fit() {
   return calibration;
 }
 
+std::vector<double> DepthCalibrator::tile_bias(const WallMeasurement& wall,
+                                               const DepthCorrector* corrector) const {
+  std::vector<double> biases(grid_.count(), std::numeric_limits<double>::quiet_NaN());
+  for (int r = 0; r < grid_.rows; ++r) {
+    for (int c = 0; c < grid_.columns; ++c) {
+      const std::size_t tile = grid_.index(r, c);
+      if (!wall.has(tile)) continue;
+      const double u = (c + 0.5) * grid_.tile_px - 0.5, v = (r + 0.5) * grid_.tile_px - 0.5;
+      const double raw_m = 1.0 / wall.measured_per_m(tile);
+      const double depth_m = corrector != nullptr ? corrector->correct_depth_m(u, v, raw_m) : raw_m;
+      biases[tile] = depth_m * wall.true_per_m(grid_.x[tile], grid_.y[tile]) - 1.0;
+    }
+  }
+  return biases;
+}
+
 std::vector<WallScore> DepthCalibrator::score(const DepthCalibration& calibration) const {
-  DepthCorrectionConfig by_default, by_paper;
-  by_paper.model = "paper";
-  const DepthCorrector corrector(by_default, calibration), paper(by_paper, calibration);
+  const auto corrector_of = [&](const char* model) {
+    DepthCorrectionConfig config;
+    config.model = model;
+    return DepthCorrector(config, calibration);
+  };
+  const DepthCorrector linear = corrector_of("default"), offset = corrector_of("offset"),
+                       paper = corrector_of("paper");
+  const auto rate = [&](const WallMeasurement& wall, const DepthCorrector* corrector, double* mean,
+                        double* p95) {
+    std::vector<double> biases = tile_bias(wall, corrector);
+    biases.erase(std::remove_if(biases.begin(), biases.end(), [](double b) { return std::isnan(b); }),
+                 biases.end());
+    for (double& bias : biases) {
+      *mean += bias / static_cast<double>(biases.size());
+      bias = std::abs(bias);
+    }
+    std::sort(biases.begin(), biases.end());
+    *p95 = biases[static_cast<std::size_t>(0.95 * static_cast<double>(biases.size() - 1))];
+  };
   std::vector<WallScore> scores;
-  std::vector<double> biases;
   for (const WallMeasurement& wall : walls_) {
     WallScore score;
     score.distance_m = wall.distance_m;
     score.frames = wall.frames;
-    const auto rate = [&](const auto& corrected, double* mean, double* p95) {
-      biases.clear();
-      *mean = 0.0;
-      for (int r = 0; r < grid_.rows; ++r) {
-        for (int c = 0; c < grid_.columns; ++c) {
-          const std::size_t tile = grid_.index(r, c);
-          if (!wall.has(tile)) continue;
-          const double u = (c + 0.5) * grid_.tile_px - 0.5, v = (r + 0.5) * grid_.tile_px - 0.5;
-          const double bias = corrected(u, v, 1.0 / wall.measured_per_m(tile)) *
-                                  wall.true_per_m(grid_.x[tile], grid_.y[tile]) -
-                              1.0;
-          *mean += bias;
-          biases.push_back(std::abs(bias));
-        }
-      }
-      *mean /= static_cast<double>(biases.size());
-      std::sort(biases.begin(), biases.end());
-      *p95 = biases[static_cast<std::size_t>(0.95 * static_cast<double>(biases.size() - 1))];
-    };
-    rate([](double, double, double z) { return z; }, &score.mean_bias_before, &score.tile_bias_p95_before);
-    rate([&](double u, double v, double z) { return corrector.correct_depth_m(u, v, z); },
-         &score.mean_bias_after, &score.tile_bias_p95_after);
-    rate([&](double u, double v, double z) { return paper.correct_depth_m(u, v, z); },
-         &score.mean_bias_after_paper, &score.tile_bias_p95_after_paper);
+    rate(wall, nullptr, &score.mean_bias_before, &score.tile_bias_p95_before);
+    rate(wall, &linear, &score.mean_bias_after, &score.tile_bias_p95_after);
+    rate(wall, &offset, &score.mean_bias_after_offset, &score.tile_bias_p95_after_offset);
+    rate(wall, &paper, &score.mean_bias_after_paper, &score.tile_bias_p95_after_paper);
     scores.push_back(score);
   }
   std::sort(scores.begin(), scores.end(),

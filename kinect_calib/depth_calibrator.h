@@ -8,6 +8,7 @@
 #include "core/camera_model.h"
 #include "kinect_calib/deband.h"
 #include "kinect_calib/depth_calibration.h"
+#include "kinect_calib/depth_corrector.h"
 #include "kinect_calib/disparity_fit.h"
 #include "kinect_calib/wall_measurement.h"
 #include "kinect_calib/wall_tiles.h"
@@ -25,14 +26,16 @@ struct DepthCalibratorConfig {
   double wall_tilt_sd = 0.01;  ///< how far one wall is off square beside what all have in common (tangent)
 };
 
-/// What one wall distance says about a calibration, for one of depth_correction's models.
+/// What one wall distance says about a calibration; biases are relative to the distance.
 struct WallScore {
   double distance_m = 0.0;
   int frames = 0;
-  double mean_bias_before = 0.0, mean_bias_after = 0.0,
-         mean_bias_after_paper = 0.0;  ///< relative, frame-wide
-  double tile_bias_p95_before = 0.0, tile_bias_p95_after = 0.0,
-         tile_bias_p95_after_paper = 0.0;  ///< relative
+  /// Frame-wide.
+  double mean_bias_before = 0.0, mean_bias_after = 0.0, mean_bias_after_offset = 0.0,
+         mean_bias_after_paper = 0.0;
+  /// 95th percentile over tiles of the absolute bias.
+  double tile_bias_p95_before = 0.0, tile_bias_p95_after = 0.0, tile_bias_p95_after_offset = 0.0,
+         tile_bias_p95_after_paper = 0.0;
 };
 
 /// Learns the depth error of a sensor from frames of a flat wall at known distances (paper section III.B):
@@ -61,6 +64,10 @@ class DepthCalibrator {
   const std::vector<WallMeasurement>& walls() const { return walls_; }
   /// How the frames added fare under a calibration, nearest wall first, on tiles of 16 px.
   std::vector<WallScore> score(const DepthCalibration& calibration) const;
+  /// Relative bias of each tile of 16 px of one of walls() under a corrector, NaN where the wall was not
+  /// seen; without a corrector the raw bias.
+  std::vector<double> tile_bias(const WallMeasurement& wall, const DepthCorrector* corrector) const;
+  const TileGrid& grid() const { return grid_; }
 
  private:
   DisparityPriors priors() const;

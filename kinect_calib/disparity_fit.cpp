@@ -103,8 +103,8 @@ double residual_per_m(const TileGrid& grid, const DisparityField& field, const W
          field.total_offset_per_m(tile);
 }
 
-/// What the field and the wall say the sensor should read [1/m]. Slopes multiply this, not the reading, whose noise
-/// would pull them towards zero.
+/// What the field and the wall say the sensor should read [1/m]. Slopes multiply this, not the reading, whose
+/// noise would pull them towards zero.
 double predicted_per_m(const TileGrid& grid, const DisparityField& field, const WallMeasurement& wall,
                        std::size_t tile) {
   return (wall_per_m(grid, wall, tile) - field.total_offset_per_m(tile)) / (1.0 + field.total_slope(tile));

@@ -23,9 +23,10 @@ struct DisparityPriors {
   bool slopes = true;  ///< false: the offset alone
 };
 
-/// 1 / z_true = (1 + scale) ((1 + slope) / z + offset) + common_offset. Scale and common offset stand apart because
-/// only the range finder knows them: together with errors of the ranges they leave every reading as it is, and
-/// were they part of slope and offset, whose priors gain by shrinking, the scale would shrink along.
+/// 1 / z_true = (1 + scale) ((1 + slope) / z + offset) + common_offset. Scale and common offset stand apart
+/// because only the range finder knows them: together with errors of the ranges they leave every reading as
+/// it is, and were they part of slope and offset, whose priors gain by shrinking, the scale would shrink
+/// along.
 struct DisparityField {
   double scale = 0.0, common_offset_per_m = 0.0;
   std::vector<double> slope, offset_per_m;

@@ -174,7 +174,8 @@ TEST(Debander, RemovesStepsAndKeepsTheSmoothError) {
     EXPECT_NEAR(step(depth), step(clean), 0.2 * kInverseDepthPerCode) << edge;
   }
   // The frame-wide mean is that of the banded frame.
-  EXPECT_NEAR(mean_per_m(depth, 0, 640), mean_per_m(wall(2.0, 4, banded), 0, 640), 0.01 * kInverseDepthPerCode);
+  EXPECT_NEAR(mean_per_m(depth, 0, 640), mean_per_m(wall(2.0, 4, banded), 0, 640),
+              0.01 * kInverseDepthPerCode);
 }
 
 TEST(Debander, LeavesAFrameWithoutBandsAlone) {
