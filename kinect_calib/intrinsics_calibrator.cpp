@@ -46,8 +46,7 @@ IntrinsicsCalibrator::View IntrinsicsCalibrator::add_view(const cv::Mat& image) 
   const cv::Mat grey = grey_image(image);
   std::vector<cv::Point2f> corners;
   const cv::Size board(config_.corners_across, config_.corners_down);
-  if (!cv::findChessboardCornersSB(grey, board, corners,
-                                   cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY)) {
+  if (!cv::findChessboardCornersSB(grey, board, corners, cv::CALIB_CB_NORMALIZE_IMAGE)) {
     return View::kNoBoard;
   }
   last_corners_ = corners;

@@ -12,7 +12,7 @@ struct ChessboardConfig {
   int corners_across = 8, corners_down = 6;  ///< inner corners, where four squares meet
   double square_m = 0.04;
   int radial_terms = 2;        ///< k1, k2 or k1, k2, k3
-  double least_change = 0.06;  ///< how far a view must lie from all before, in shares of the image
+  double least_change = 0.03;  ///< how far a view must lie from all before, in shares of the image
 };
 
 struct IntrinsicsResult {
