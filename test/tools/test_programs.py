@@ -14,8 +14,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 PROGRAMS = pathlib.Path(sys.argv[1])
-PROGRAM_NAMES = ("replay", "build_map", "import_carmen", "import_depth_images", "evaluate_trajectory", "calibrate_depth", "calibrate_intrinsics", "score_walls",
-                 "optimize_graph", "map_info", "localize")
+PROGRAM_NAMES = ("replay", "build_map", "import_carmen", "import_depth_images", "evaluate_trajectory", "calibrate_depth",
+                 "calibrate_intrinsics", "score_walls", "optimize_graph", "map_info", "localize")
 
 
 def run(name, *arguments):
