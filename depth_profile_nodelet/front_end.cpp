@@ -25,8 +25,13 @@ FrontEndConfig FrontEndConfig::from_file(const std::string& path) {
   return config;
 }
 
-FrontEnd::FrontEnd(const FrontEndConfig& config)
-    : corrector_(config.depth_correction),
+FrontEnd::FrontEnd(const FrontEndConfig& config) : FrontEnd(config, DepthCorrector(config.depth_correction)) {}
+
+FrontEnd::FrontEnd(const FrontEndConfig& config, const DepthCalibration& calibration)
+    : FrontEnd(config, DepthCorrector(config.depth_correction, calibration)) {}
+
+FrontEnd::FrontEnd(const FrontEndConfig& config, DepthCorrector corrector)
+    : corrector_(std::move(corrector)),
       rolling_shutter_(config.rolling_shutter),
       floor_remover_(config.floor_removal),
       extractor_(config.depth_profile) {

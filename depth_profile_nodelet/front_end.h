@@ -40,6 +40,8 @@ class FrontEnd {
  public:
   /// UserError if the configuration or the calibration file is not usable.
   explicit FrontEnd(const FrontEndConfig& config);
+  /// With this calibration instead of the file's.
+  FrontEnd(const FrontEndConfig& config, const DepthCalibration& calibration);
 
   /// @param depth           16UC1 mm (0 invalid) or 32FC1 m, of the size `camera` says
   /// @param stamp_s         of the row that rolling_shutter/stamp_row_fraction names
@@ -65,6 +67,7 @@ class FrontEnd {
   RollingShutterCorrector::Outcome rolling_shutter_outcome() const { return unrolled_how_; }
 
  private:
+  FrontEnd(const FrontEndConfig& config, DepthCorrector corrector);
   void process_rectified(const PinholeModel& camera, double stamp_s, const Eigen::Isometry3d& T_base_optical,
                          const PoseBuffer& odometry, DepthProfile* out);
 

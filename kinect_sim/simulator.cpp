@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "kinect_sim/camera_mount.h"
 #include "kinect_sim/depth_renderer.h"
 #include "kinect_sim/infrared_camera.h"
 #include "kinect_sim/scene.h"
@@ -16,15 +17,6 @@ namespace knav {
 namespace {
 
 constexpr double kContactGap_m = 0.02;  ///< a contact is over when the gap has opened this much
-
-PinholeModel kinect_camera() { return {640, 480, 585.0, 585.0, 319.5, 239.5}; }
-
-Eigen::Isometry3d isometry(const Pose2& pose) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.translation() << pose.x_m, pose.y_m, 0.0;
-  T.linear() = Eigen::AngleAxisd(pose.yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  return T;
-}
 
 }  // namespace
 
@@ -83,23 +75,11 @@ Simulator::~Simulator() = default;
 const PinholeModel& Simulator::camera() const { return rendering_->camera; }
 
 Eigen::Isometry3d Simulator::T_base_camera() const {
-  constexpr double kDegree = kPi / 180.0;
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.translation() << config_.camera_forward_m, 0.0, config_.camera_height_m;
-  T.linear() = (Eigen::AngleAxisd(config_.camera_yaw_deg * kDegree, Eigen::Vector3d::UnitZ()) *
-                Eigen::AngleAxisd(config_.camera_pitch_deg * kDegree, Eigen::Vector3d::UnitY()) *
-                Eigen::AngleAxisd(config_.camera_roll_deg * kDegree, Eigen::Vector3d::UnitX()))
-                   .toRotationMatrix();
-  return T;
+  return camera_mount({config_.camera_forward_m, 0.0, config_.camera_height_m}, config_.camera_yaw_deg,
+                      config_.camera_pitch_deg, config_.camera_roll_deg);
 }
 
-Eigen::Isometry3d Simulator::T_base_optical() const {
-  Eigen::Matrix3d R_camera_optical;
-  R_camera_optical << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  Eigen::Isometry3d T = T_base_camera();
-  T.linear() = T.linear() * R_camera_optical;
-  return T;
-}
+Eigen::Isometry3d Simulator::T_base_optical() const { return optical_frame(T_base_camera()); }
 
 Pose2 Simulator::T_base_laser() const { return {config_.laser_forward_m, 0.0, 0.0}; }
 
