@@ -17,22 +17,26 @@ constexpr int kRounds = 4;
 // noise.
 constexpr float kSmallestWindow_m = 0.015f;
 
-/// Puts one row's readings beyond `beyond` into the sorted lists of their columns: a comparator chain without
-/// branches.
+/// A strip of eight columns: GCC's own vectors, so that the eight sorted lists stay in registers down all the
+/// rows, in whichever version runs.
+constexpr int kStrip = 8;
+typedef float Strip __attribute__((vector_size(sizeof(float) * kStrip), aligned(4)));
+
+/// The kept smallest readings beyond `beyond_m` of eight columns, ascending: a comparator chain without
+/// branches. @param z_m the strip's first reading, @param stride from row to row
 KNAV_MULTIVERSION
-void insert_row(const float* z_m, int width, const float* beyond_m, float range_max_m, float* smallest) {
-  float* s0 = smallest;
-  float *s1 = s0 + width, *s2 = s1 + width, *s3 = s2 + width, *s4 = s3 + width, *s5 = s4 + width,
-        *s6 = s5 + width, *s7 = s6 + width;
-#pragma GCC ivdep
-  for (int u = 0; u < width; ++u) {
-    const float z = z_m[u];
-    float value = z <= range_max_m ? z : kInf;
-    value = z > beyond_m[u] ? value : kInf;
-    float kept;
-#define KNAV_COMPARE(list)               \
-  kept = list[u];                        \
-  list[u] = value < kept ? value : kept; \
+void smallest_of_strip(const float* z_m, std::size_t stride, int rows, const float* beyond_m,
+                       float range_max_m, float* smallest) {
+  const Strip none = {kInf, kInf, kInf, kInf, kInf, kInf, kInf, kInf};
+  Strip s0 = none, s1 = none, s2 = none, s3 = none, s4 = none, s5 = none, s6 = none, s7 = none;
+  const Strip beyond = *reinterpret_cast<const Strip*>(beyond_m);
+  for (int v = 0; v < rows; ++v, z_m += stride) {
+    const Strip z = *reinterpret_cast<const Strip*>(z_m);
+    Strip value = (z <= range_max_m) & (z > beyond) ? z : none;
+    Strip kept;
+#define KNAV_COMPARE(list)            \
+  kept = list;                        \
+  list = value < kept ? value : kept; \
   value = value < kept ? kept : value;
     KNAV_COMPARE(s0)
     KNAV_COMPARE(s1)
@@ -41,9 +45,18 @@ void insert_row(const float* z_m, int width, const float* beyond_m, float range_
     KNAV_COMPARE(s4)
     KNAV_COMPARE(s5)
     KNAV_COMPARE(s6)
-    s7[u] = value < s7[u] ? value : s7[u];
+    s7 = value < s7 ? value : s7;
 #undef KNAV_COMPARE
   }
+  Strip* out = reinterpret_cast<Strip*>(smallest);
+  out[0] = s0;
+  out[1] = s1;
+  out[2] = s2;
+  out[3] = s3;
+  out[4] = s4;
+  out[5] = s5;
+  out[6] = s6;
+  out[7] = s7;
 }
 
 KNAV_MULTIVERSION
@@ -74,34 +87,46 @@ void ColumnSurface::find(const cv::Mat& sliced) {
   const auto width = static_cast<std::size_t>(sliced.cols);
   nearest_m_.assign(width, kNaN);
   window_end_m_.assign(width, kNaN);
-  beyond_m_.assign(width, 0.0f);
-  first_m_.assign(width, kNaN);
+  for (int first = 0; first < sliced.cols; first += kStrip) find_in_strip(sliced, first);
+  for (std::size_t u = 0; u < width; ++u) window_end_m_[u] = window_end(nearest_m_[u]);
+}
+
+void ColumnSurface::find_in_strip(const cv::Mat& sliced, int first_column) {
+  const int columns = std::min(kStrip, sliced.cols - first_column);
+  const cv::Mat within = sliced.colRange(first_column, first_column + columns);
+  if (columns < kStrip) {  // the image's last columns
+    narrow_.create(sliced.rows, kStrip, CV_32FC1);
+    narrow_.setTo(kNaN);
+    within.copyTo(narrow_.colRange(0, columns));
+  }
+  const cv::Mat& strip = columns < kStrip ? narrow_ : within;
+  float nearest[kStrip], first[kStrip], beyond[kStrip], smallest[kStrip * kKept];
+  std::fill(nearest, nearest + kStrip, kNaN);
+  std::fill(first, first + kStrip, kNaN);
+  std::fill(beyond, beyond + kStrip, 0.0f);
   // Where all of the smallest readings are strays, which is rare, the next ones are looked at.
-  for (int round = 0; round < kRounds; ++round) {
-    smallest_.assign(width * kKept, kInf);
-    for (int v = 0; v < sliced.rows; ++v) {
-      insert_row(sliced.ptr<float>(v), sliced.cols, beyond_m_.data(), range_max_m_, smallest_.data());
-    }
-    bool more = false;
-    for (std::size_t u = 0; u < width; ++u) {
-      if (!std::isnan(nearest_m_[u]) || std::isinf(beyond_m_[u])) continue;
+  bool more = true;
+  for (int round = 0; round < kRounds && more; ++round) {
+    smallest_of_strip(strip.ptr<float>(0), strip.step1(), strip.rows, beyond, range_max_m_, smallest);
+    more = false;
+    for (int i = 0; i < kStrip; ++i) {
+      if (!std::isnan(nearest[i]) || std::isinf(beyond[i])) continue;
       float sorted[kKept];
-      for (std::size_t k = 0; k < kKept; ++k) sorted[k] = smallest_[k * width + u];
-      if (round == 0 && std::isfinite(sorted[0])) first_m_[u] = sorted[0];
-      nearest_m_[u] = first_supported(sorted);
+      for (int k = 0; k < kKept; ++k) sorted[k] = smallest[k * kStrip + i];
+      if (round == 0 && std::isfinite(sorted[0])) first[i] = sorted[0];
+      nearest[i] = first_supported(sorted);
       const bool full = std::isfinite(sorted[kKept - 1]);
       // The last ones may belong to a surface that goes on: they are looked at again.
       const int again = std::max(0, kKept - support_rows_);
-      beyond_m_[u] = full && std::isnan(nearest_m_[u]) ? sorted[again] : kInf;
-      more = more || !std::isinf(beyond_m_[u]);
+      beyond[i] = full && std::isnan(nearest[i]) ? sorted[again] : kInf;
+      more = more || !std::isinf(beyond[i]);
     }
-    if (!more) break;
   }
-  for (std::size_t u = 0; u < width; ++u) {
+  for (int i = 0; i < columns; ++i) {
     // Dozens of readings, none near another: something slanting and ragged, whose nearest point is the safe
     // answer.
-    if (std::isnan(nearest_m_[u]) && !std::isinf(beyond_m_[u])) nearest_m_[u] = first_m_[u];
-    window_end_m_[u] = window_end(nearest_m_[u]);
+    if (std::isnan(nearest[i]) && !std::isinf(beyond[i])) nearest[i] = first[i];
+    nearest_m_[static_cast<std::size_t>(first_column + i)] = nearest[i];
   }
 }
 

@@ -15,9 +15,20 @@ class ColumnSurface {
   /// @param range_max_m  readings farther than this do not exist
   void configure(int support_rows, double window_per_m, double range_max_m);
 
+  /// Both would find the same in the same image.
+  bool finds_the_same(const ColumnSurface& other) const {
+    return support_rows_ == other.support_rows_ && window_per_m_ == other.window_per_m_ &&
+           range_max_m_ == other.range_max_m_;
+  }
+
   /// After this nearest_m() has, per column, the nearest reading of the nearest supported surface (NaN:
   /// none), and window_end_m() where the window behind it ends.
   void find(const cv::Mat& sliced);
+  /// Takes over what `other` found.
+  void take(const ColumnSurface& other) {
+    nearest_m_ = other.nearest_m_;
+    window_end_m_ = other.window_end_m_;
+  }
   const std::vector<float>& nearest_m() const { return nearest_m_; }
   const std::vector<float>& window_end_m() const { return window_end_m_; }
 
@@ -27,15 +38,15 @@ class ColumnSurface {
   static void minimum(const cv::Mat& sliced, double range_max_m, std::vector<float>* z_m);
 
  private:
+  void find_in_strip(const cv::Mat& sliced, int first_column);
   float first_supported(const float* sorted) const;
   float window_end(float nearest_m) const;
 
   int support_rows_ = 3;
   float window_per_m_ = 0.01f;
   float range_max_m_ = 20.0f;
-  std::vector<float>
-      smallest_;  // the eight smallest readings of each column: eight rows, sorted down the rows
-  std::vector<float> nearest_m_, window_end_m_, beyond_m_, first_m_, sum_, count_;
+  std::vector<float> nearest_m_, window_end_m_, sum_, count_;
+  cv::Mat narrow_;
 };
 
 }  // namespace knav

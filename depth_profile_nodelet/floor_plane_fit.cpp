@@ -3,10 +3,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "core/multiversion.h"
 #include "core/pose2.h"
 #include "kinect_calib/kinect_noise.h"
-#include "core/multiversion.h"
 
 namespace knav {
 namespace {
@@ -41,8 +42,63 @@ void add_row(const float* z_m, int width, const RowTerms& terms, float* n, float
   }
 }
 
+/// When a column's readings, given their sums, count as floor.
+struct LineTerms {
+  float variance_max;     ///< of the readings about their own line
+  float slope_max;        ///< of the line against the reference plane's; infinite: any
+  float slope_sd_factor;  ///< a slope from few rows is itself uncertain
+};
+
+/// Do the readings lie on a line, and does it rise as the floor's? Without branches, so that it vectorises.
+inline bool like_floor(float n, float y, float yy, float r, float yr, float rr, const LineTerms& terms) {
+  const float per_n = 1.0f / n, mean_y = y * per_n, mean_r = r * per_n;
+  const float var_y = yy * per_n - mean_y * mean_y;
+  const float cov = yr * per_n - mean_y * mean_r;
+  const float slope = cov / var_y;
+  const float var_r = rr * per_n - mean_r * mean_r - slope * cov;
+  const float steep = slope < 0.0f ? -slope : slope;
+  const float steep_max = terms.slope_max + terms.slope_sd_factor / std::sqrt(n * var_y);
+  return (var_y >= 1e-9f) & (var_r <= terms.variance_max) & (steep <= steep_max);
+}
+
+/// A column's sums, by name.
+struct SumPointers {
+  float *n, *y, *yy, *r, *yr, *rr;
+};
+
+/// Adds a block of rows to the columns in which it looks like floor, and clears it.
+KNAV_MULTIVERSION
+void add_columns(const SumPointers& block, const SumPointers& sums, float* candidates, int width,
+                 const LineTerms& line) {
+  const LineTerms terms = line;
+  const SumPointers b = block, s = sums;
+#pragma GCC ivdep
+  for (int u = 0; u < width; ++u) {
+    const float n = b.n[u], y = b.y[u], yy = b.yy[u], r = b.r[u], yr = b.yr[u], rr = b.rr[u];
+    const bool joins = (n >= 4.0f) & like_floor(n, y, yy, r, yr, rr, terms);
+    candidates[u] += n;
+    s.n[u] += joins ? n : 0.0f;
+    s.y[u] += joins ? y : 0.0f;
+    s.yy[u] += joins ? yy : 0.0f;
+    s.r[u] += joins ? r : 0.0f;
+    s.yr[u] += joins ? yr : 0.0f;
+    s.rr[u] += joins ? rr : 0.0f;
+    b.n[u] = b.y[u] = b.yy[u] = b.r[u] = b.yr[u] = b.rr[u] = 0.0f;
+  }
+}
+
 /// Inverse depth is ray . g with g = -up / height.
 Eigen::Vector3d gradient_of(const FloorPlane& plane) { return -plane.up / plane.height_m; }
+
+LineTerms line_terms(const FloorFitConfig& config, const FloorPlane& reference) {
+  const auto noise = static_cast<float>(config.noise_codes * kInverseDepthPerCode);
+  if (config.method == "paper") return {noise * noise, std::numeric_limits<float>::infinity(), 0.0f};
+  // The inverse depth of a floor rises by 1 / height per unit of y; a wall's does not rise at all.
+  const double steepness = std::abs(gradient_of(reference).y());
+  return {noise * noise,
+          static_cast<float>(steepness * (config.height_tolerance_m / reference.height_m + 0.15)),
+          static_cast<float>(2.0 * kInverseDepthPerCode)};
+}
 
 FloorPlane plane_of(const Eigen::Vector3d& gradient) {
   FloorPlane plane;
@@ -155,36 +211,12 @@ void FloorPlaneFit::accumulate(const cv::Mat& depth, const PinholeModel& camera,
 /// The rows up to where a wall stands are floor, the wall's foot is within the gate too: so readings are
 /// judged by blocks of rows, and only blocks that rise like a floor join their column's sums.
 void FloorPlaneFit::add_block(const FloorPlane& reference) {
-  const bool paper = config_.method == "paper";
-  for (std::size_t u = 0; u < sums_.n.size(); ++u) {
-    candidates_[u] += block_.n[u];
-    if (block_.n[u] < 4.0f || !(paper || like_floor(block_, u, reference))) continue;
-    sums_.n[u] += block_.n[u];
-    sums_.y[u] += block_.y[u];
-    sums_.yy[u] += block_.yy[u];
-    sums_.r[u] += block_.r[u];
-    sums_.yr[u] += block_.yr[u];
-    sums_.rr[u] += block_.rr[u];
-  }
-  block_.reset(static_cast<int>(sums_.n.size()));
-}
-
-/// Do the readings lie on a line, and (but for the paper) does it rise as the floor's?
-bool FloorPlaneFit::like_floor(const Sums& sums, std::size_t u, const FloorPlane& reference) const {
-  const double n = sums.n[u], mean_y = sums.y[u] / n, mean_r = sums.r[u] / n;
-  const double var_y = sums.yy[u] / n - mean_y * mean_y;
-  const double cov = sums.yr[u] / n - mean_y * mean_r;
-  if (var_y < 1e-9) return false;
-  const double slope = cov / var_y;
-  const double var_r = std::max(0.0, sums.rr[u] / n - mean_r * mean_r - slope * cov);
-  if (std::sqrt(var_r) > config_.noise_codes * kInverseDepthPerCode) return false;
-  if (config_.method == "paper") return true;
-  // The inverse depth of a floor rises by 1 / height per unit of y; a wall's does not rise at all. A slope
-  // from few rows is itself uncertain.
-  const double steepness = std::abs(gradient_of(reference).y());
-  const double uncertainty = 2.0 * kInverseDepthPerCode / std::sqrt(n * var_y);
-  return std::abs(slope) <=
-         steepness * (config_.height_tolerance_m / reference.height_m + 0.15) + uncertainty;
+  const auto pointers = [](Sums& sums) {
+    return SumPointers{sums.n.data(), sums.y.data(),  sums.yy.data(),
+                       sums.r.data(), sums.yr.data(), sums.rr.data()};
+  };
+  add_columns(pointers(block_), pointers(sums_), candidates_.data(), static_cast<int>(sums_.n.size()),
+              line_terms(config_, reference));
 }
 
 int FloorPlaneFit::vote(const PinholeModel& camera, const FloorPlane& reference, int* heard) {
@@ -192,12 +224,15 @@ int FloorPlaneFit::vote(const PinholeModel& camera, const FloorPlane& reference,
   votes_.assign(width, 0);
   const bool paper = config_.method == "paper";
   const int rows = paper ? std::max(config_.min_rows, config_.paper_rows / 2) : config_.min_rows;
+  const LineTerms line = line_terms(config_, reference);
   int agreed = 0;
   *heard = 0;
   for (std::size_t u = 0; u < width; ++u) {
     if (candidates_[u] < static_cast<float>(rows)) continue;
     ++*heard;
-    if (sums_.n[u] < static_cast<float>(rows) || !like_floor(sums_, u, reference)) continue;
+    if (sums_.n[u] < static_cast<float>(rows)) continue;
+    if (!like_floor(sums_.n[u], sums_.y[u], sums_.yy[u], sums_.r[u], sums_.yr[u], sums_.rr[u], line))
+      continue;
     votes_[u] = 1;
     ++agreed;
   }

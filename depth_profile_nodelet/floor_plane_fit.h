@@ -84,7 +84,6 @@ class FloorPlaneFit {
   void accumulate(const cv::Mat& depth, const PinholeModel& camera, const FloorPlane& reference,
                   double gate_m, double gate_per_m);
   void add_block(const FloorPlane& reference);
-  bool like_floor(const Sums& sums, std::size_t u, const FloorPlane& reference) const;
   int vote(const PinholeModel& camera, const FloorPlane& reference, int* heard);
   bool solve(const PinholeModel& camera, const FloorPlane& reference, FloorPlane* plane) const;
 

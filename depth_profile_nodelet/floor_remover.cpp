@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "core/multiversion.h"
 #include "depth_profile_nodelet/profile_extractor.h"
 #include "kinect_calib/kinect_noise.h"
-#include "core/multiversion.h"
 
 namespace knav {
 namespace {
@@ -19,6 +19,15 @@ struct RowTerms {
   float up_x, up_row, forward_x, forward_row;
   float height_m, bottom_m, bottom_per_m, top_m;
 };
+
+/// Normalised source columns of a levelled row: x = (a x' + b) / (c x' + d).
+KNAV_MULTIVERSION
+void source_columns(float a, float b, float c, float d, float per_fx, float cx_px, int width, float* x) {
+  for (int u = 0; u < width; ++u) {
+    const float levelled = (static_cast<float>(u) - cx_px) * per_fx;
+    x[u] = (a * levelled + b) / (c * levelled + d);
+  }
+}
 
 /// Levelled distance of what lies in the slice, else NaN.
 KNAV_MULTIVERSION
@@ -152,6 +161,7 @@ void FloorRemover::slice_rows(const cv::Mat& depth, const PinholeModel& camera, 
     return;
   }
   row_z_m_.resize(static_cast<std::size_t>(depth.cols));
+  source_x_.resize(static_cast<std::size_t>(depth.cols));
   FollowTerms follow{};
   follow.gap_m = 0.15f;
   follow.gap_per_m = 0.15f;
@@ -180,7 +190,11 @@ void FloorRemover::slice_rows(const cv::Mat& depth, const PinholeModel& camera, 
     terms.bottom_m = static_cast<float>(config_.slice_bottom_m);
     terms.bottom_per_m = static_cast<float>(config_.slice_bottom_per_m);
     terms.top_m = static_cast<float>(config_.slice_top_m);
-    const float* x = warp_.source_x().data();
+    const float* x = source_x_.data();
+    source_columns(static_cast<float>(forward_row), static_cast<float>(-right_row),
+                   static_cast<float>(-level.forward.x()), static_cast<float>(level.right.x()),
+                   static_cast<float>(1.0 / camera.fx_px), static_cast<float>(camera.cx_px), depth.cols,
+                   source_x_.data());
     slice_row(z_m, x, depth.cols, terms, sliced->ptr<float>(v));
     const float steepest =
         terms.up_row - std::abs(terms.up_x) * std::max(std::abs(x[0]), std::abs(x[depth.cols - 1]));

@@ -89,6 +89,8 @@ class FloorRemover {
   /// @param sliced         32FC1 m; allocated only when its size changes
   void process(const cv::Mat& depth, const PinholeModel& camera, double stamp_s,
                const Eigen::Isometry3d& T_base_optical, cv::Mat* sliced, FloorResult* result);
+  /// The nearest surface of each column of the newest sliced image.
+  const ColumnSurface& surface() const { return surface_; }
   /// Forgets the previous floor (the clock jumped).
   void reset() { fit_.reset(); }
 
@@ -107,7 +109,7 @@ class FloorRemover {
   ColumnSurface surface_;
   RowWarp warp_;
   Columns columns_;
-  std::vector<float> row_z_m_;
+  std::vector<float> row_z_m_, source_x_;
   std::vector<float> low_seen_, middle_seen_, high_seen_;
 };
 

@@ -25,7 +25,8 @@ FrontEndConfig FrontEndConfig::from_file(const std::string& path) {
   return config;
 }
 
-FrontEnd::FrontEnd(const FrontEndConfig& config) : FrontEnd(config, DepthCorrector(config.depth_correction)) {}
+FrontEnd::FrontEnd(const FrontEndConfig& config)
+    : FrontEnd(config, DepthCorrector(config.depth_correction)) {}
 
 FrontEnd::FrontEnd(const FrontEndConfig& config, const DepthCalibration& calibration)
     : FrontEnd(config, DepthCorrector(config.depth_correction, calibration)) {}
@@ -61,7 +62,7 @@ void FrontEnd::process_rectified(const PinholeModel& camera, double stamp_s,
   unrolled_how_ = rolling_shutter_.correct(rectified_, camera, stamp_s, odometry, &unrolled_);
   floor_remover_.process(unrolled(), camera, stamp_s, T_base_optical, &sliced_, &floor_);
   extractor_.extract(sliced_, camera, stamp_s, floor_.plane.height_m, floor_.free_from_m, floor_.free_to_m,
-                     floor_.height_class, out);
+                     floor_.height_class, out, &floor_remover_.surface());
 }
 
 }  // namespace knav

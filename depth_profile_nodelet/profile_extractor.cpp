@@ -20,7 +20,8 @@ ProfileExtractor::ProfileExtractor(const DepthProfileConfig& config) : config_(c
 void ProfileExtractor::extract(const cv::Mat& sliced, const PinholeModel& camera, double stamp_s,
                                double camera_height_m, const std::vector<float>& free_from_m,
                                const std::vector<float>& free_to_m,
-                               const std::vector<HeightClass>& height_class, DepthProfile* profile) {
+                               const std::vector<HeightClass>& height_class, DepthProfile* profile,
+                               const ColumnSurface* found) {
   profile->stamp_s = stamp_s;
   profile->fx_px = camera.fx_px;
   profile->cx_px = camera.cx_px;
@@ -29,7 +30,11 @@ void ProfileExtractor::extract(const cv::Mat& sliced, const PinholeModel& camera
   if (config_.method == "paper") {
     ColumnSurface::minimum(sliced, config_.range_max_m, &profile->z_m);
   } else {
-    surface_.find(sliced);
+    if (found && found->finds_the_same(surface_)) {
+      surface_.take(*found);
+    } else {
+      surface_.find(sliced);
+    }
     surface_.average(sliced, &profile->z_m);
   }
   smooth(&profile->z_m);

@@ -55,9 +55,12 @@ class ProfileExtractor {
   /// @param profile z is written; free_from, free_to and height_class are taken from the floor (one entry a
   /// column) and
   ///                made to agree with z
+  /// @param found   what ColumnSurface::find() found in this very image, if somebody has it: saves finding it
+  /// again
   void extract(const cv::Mat& sliced, const PinholeModel& camera, double stamp_s, double camera_height_m,
                const std::vector<float>& free_from_m, const std::vector<float>& free_to_m,
-               const std::vector<HeightClass>& height_class, DepthProfile* profile);
+               const std::vector<HeightClass>& height_class, DepthProfile* profile,
+               const ColumnSurface* found = nullptr);
 
  private:
   void smooth(std::vector<float>* z_m);
