@@ -50,6 +50,8 @@ RollingShutterCorrector::Outcome RollingShutterCorrector::correct(const cv::Mat&
   if (largest_rad * edge > 0.5) return Outcome::kNoOdometry;  // 30 rad/s: no robot turns so; odometry jumped
 
   unrolled->create(depth.rows, depth.cols, CV_32FC1);
+  const bool straighten = config_.straighten_edges && config_.method != "paper";
+  if (straighten) edges_.start(depth.rows, depth.cols);
   for (int v = 0; v < depth.rows; ++v) {
     const double yaw_rad = row_yaw_rad_[static_cast<std::size_t>(v)];
     const float* from = depth.ptr<float>(v);
@@ -68,7 +70,9 @@ RollingShutterCorrector::Outcome RollingShutterCorrector::correct(const cv::Mat&
     }
     turn_depth(to, depth.cols, static_cast<float>(c), static_cast<float>(s / camera.fx_px),
                static_cast<float>(camera.cx_px));
+    if (straighten) edges_.add_row(v, to, warp_);
   }
+  if (straighten) edges_.finish(unrolled);
   return Outcome::kCorrected;
 }
 

@@ -6,6 +6,7 @@
 
 #include "core/camera_model.h"
 #include "core/pose_buffer.h"
+#include "depth_profile_nodelet/edge_straightener.h"
 #include "depth_profile_nodelet/row_warp.h"
 
 namespace knav {
@@ -15,6 +16,7 @@ struct RollingShutterConfig {
   double readout_s = 1.0 / 30.0;
   double stamp_row_fraction = 0.5;
   double time_offset_s = 0.0;
+  bool straighten_edges = true;
   double odometry_gap_s = 0.25;
   double odometry_extrapolation_s = 0.1;
 
@@ -28,6 +30,8 @@ struct RollingShutterConfig {
              "Which row the stamp means: 0 the first, 0.5 the middle, 1 the last.");
     v.number("time_offset_s", time_offset_s, -0.5, 0.5, "s",
              "Added to a depth stamp to get odometry's time.");
+    v.flag("straighten_edges", straighten_edges,
+           "default: place upright edges by the mean over many rows, to better than a pixel.");
     v.number("odometry_gap_s", odometry_gap_s, 0.01, 5, "s",
              "Odometry is not interpolated over longer gaps.");
     v.number("odometry_extrapolation_s", odometry_extrapolation_s, 0, 1, "s",
@@ -55,6 +59,7 @@ class RollingShutterCorrector {
 
   RollingShutterConfig config_;
   RowWarp warp_;
+  EdgeStraightener edges_;
   std::vector<double> row_yaw_rad_;
 };
 
