@@ -152,7 +152,10 @@ bool FloorPlaneFit::fit_frame(const cv::Mat& depth, const PinholeModel& camera, 
   int heard = 0;
   const int agreed = vote(camera, mount, &heard);
   result->vote_fraction = heard > 0 ? static_cast<double>(agreed) / heard : 0.0;
-  if (agreed < config_.min_columns || result->vote_fraction < config_.majority) return false;
+  // What fails the vote is no floor but does not hide it either: the columns that agree with each other and
+  // with the mount need no more than half. The paper's have nothing but their number.
+  const double majority = paper ? config_.paper_majority : config_.majority;
+  if (agreed < config_.min_columns || result->vote_fraction < majority) return false;
   FloorPlane plane;
   if (!solve(camera, mount, &plane)) return false;
   if (!paper) {

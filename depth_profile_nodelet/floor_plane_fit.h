@@ -28,11 +28,12 @@ struct FloorFitConfig {
   double height_tolerance_m = 0.05;
   double range_max_m = 4.0;
   double noise_codes = 2.0;
-  double majority = 0.75;
+  double majority = 0.5;
   int min_rows = 12;
   int min_columns = 40;
   double previous_timeout_s = 2.0;
   int paper_rows = 48;
+  double paper_majority = 0.75;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -54,6 +55,7 @@ struct FloorFitConfig {
              "After this long without a fit the mount's plane is used.");
     v.integer("paper_rows", paper_rows, 4, 480, "rows",
               "paper: the bottom rows of the image that are looked at.");
+    v.number("paper_majority", paper_majority, 0.1, 1, "", "paper: `majority`.");
   }
 };
 

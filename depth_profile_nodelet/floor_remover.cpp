@@ -12,6 +12,7 @@ namespace knav {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kFollowedFrom_m = 0.8f;  // nearer the sensor may see nothing
 
 /// For one row: with x the normalised column of the source pixel, up . ray = up_x x + up_row, and the same
 /// for forward.
@@ -47,6 +48,7 @@ struct FollowTerms {
   float follow_to_m;           ///< farther off the floor's readings are noise
   float floor_range_m;         ///< rows that meet the floor farther off belong to the sweep
   float below_m, below_per_m;  ///< readings this far under the floor are a drop
+  float begin_m;               ///< where the view's lower edge meets the floor: it is followed from there
 };
 
 /// One step of following the floor up the columns, the lowest row first.
@@ -71,9 +73,8 @@ void follow_row(const float* z_m, const float* x, int width, const RowTerms& ter
     float on_floor = size <= low ? 1.0f : 0.0f;
     on_floor = expected < f.follow_to_m ? on_floor : 0.0f;
     on_floor = forward < 2.0f * f.follow_to_m ? on_floor : 0.0f;
-    float gap = expected > to * (1.0f + f.gap_per_m) + f.gap_m ? 1.0f - on_floor : 0.0f;
-    gap = to > 0.0f ? gap : 0.0f;  // it has not begun yet
-    const float living = gap > 0.0f ? 0.0f : was_alive;
+    const float followed = to > 0.0f ? to : f.begin_m;
+    const float living = expected > followed * (1.0f + f.gap_per_m) + f.gap_m ? 0.0f : was_alive;
     const float follows = on_floor * living;
     const float nearer = expected < from ? expected : from;
     const float farther = expected > to ? expected : to;
@@ -126,6 +127,19 @@ Level level_of(const FloorPlane& plane) {
   return level;
 }
 
+/// Where the row meets the floor, at the farther of its two ends [m]; +Inf if it does not.
+float floor_begins_m(const PinholeModel& camera, const Level& level, double height_m, int row) {
+  const double y = (row - camera.cy_px) / camera.fy_px;
+  double farthest = 0.0;
+  for (const double u : {0.0, camera.width_px - 1.0}) {
+    const Eigen::Vector3d ray((u - camera.cx_px) / camera.fx_px, y, 1.0);
+    const double fall = -level.up.dot(ray);
+    if (fall <= 1e-4) return std::numeric_limits<float>::infinity();
+    farthest = std::max(farthest, height_m * level.forward.dot(ray) / fall);
+  }
+  return static_cast<float>(farthest);
+}
+
 }  // namespace
 
 void FloorRemover::Columns::reset(int width) {
@@ -169,6 +183,7 @@ void FloorRemover::slice_rows(const cv::Mat& depth, const PinholeModel& camera, 
   follow.follow_to_m = static_cast<float>(1.5 * config_.floor_range_m);
   follow.below_m = static_cast<float>(0.05 + 2.0 * config_.slice_bottom_m);
   follow.below_per_m = static_cast<float>(3.0 * config_.slice_bottom_per_m);
+  follow.begin_m = std::max(kFollowedFrom_m, floor_begins_m(camera, level, plane.height_m, depth.rows - 1));
   for (int v = depth.rows - 1; v >= 0; --v) {
     const double y = (v - camera.cy_px) / camera.fy_px;
     const auto along_row = [&](const Eigen::Vector3d& axis) { return axis.y() * y + axis.z(); };

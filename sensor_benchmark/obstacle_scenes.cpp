@@ -158,6 +158,9 @@ nlohmann::json measure_presence(const Scene& scene, const SensorBenchmarkOptions
 
 // --- Stairs down -------------------------------------------------------------------------------------------
 
+constexpr double kStairs_m = 5.0;         // along the robot's way; floor goes on behind
+constexpr double kEdgeTolerance_m = 0.1;  // less than a wheel's radius
+
 nlohmann::json measure_stairs(const SensorBenchmarkOptions& options, Devices* devices,
                               std::vector<Check>* checks) {
   const Scene scene = {"stairs down",
@@ -165,21 +168,27 @@ nlohmann::json measure_stairs(const SensorBenchmarkOptions& options, Devices* de
                        "boxes: [{at: [-9, 9], size: [1, 1, 1]}, {at: [-9, -9], size: [1, 1, 1]}]\n"
                        "stairs_down: [{min: [0, -7], max: [5, 7], direction: +x}]\nspawn: [-5, 0, 0]\n",
                        4.0, 1.4};
-  double columns = 0.0, free[2] = {0.0, 0.0};
+  double columns = 0.0, free[2] = {0.0, 0.0}, farthest_m[2] = {-9.0, -9.0};
   run(scene, options, devices, [&](SceneRunner& runner, const SceneRunner::View& view, double distance_m) {
     const PinholeModel& camera = runner.camera();
     const double c = std::cos(view.T_world_base.yaw_rad), s = std::sin(view.T_world_base.yaw_rad);
     for (std::size_t u = 0; u < view.true_z_m.size(); ++u) {
       const double x = (static_cast<double>(u) - camera.cx_px) / camera.fx_px;  // right / forward
-      const double edge_m = distance_m / (c + x * s);
+      const double edge_m = distance_m / (c + x * s), floor_again_m = (distance_m + kStairs_m) / (c + x * s);
       columns += 1.0;
-      for (const int which : kBoth)
-        free[which] += view.profile[which].free_to_m[u] > edge_m + 0.1 ? 1.0 : 0.0;
+      for (const int which : kBoth) {
+        const DepthProfile& profile = view.profile[which];
+        if (!(profile.free_from_m[u] < floor_again_m - kEdgeTolerance_m)) continue;  // behind the stairwell
+        const double beyond_m = profile.free_to_m[u] - edge_m;
+        free[which] += beyond_m > kEdgeTolerance_m ? 1.0 : 0.0;
+        farthest_m[which] = std::fmax(farthest_m[which], beyond_m);
+      }
     }
   });
   nlohmann::json json = {{"columns", columns}};
   for (const int which : kBoth) {
-    json[kNames[which]] = {{"free_beyond_the_edge_percent_of_columns", 100 * free[which] / columns}};
+    json[kNames[which]] = {{"free_beyond_the_edge_percent_of_columns", 100 * free[which] / columns},
+                           {"farthest_free_beyond_the_edge_m", farthest_m[which]}};
   }
   checks->push_back({"floor: stairs down free [% of columns]", 100 * free[0] / columns, 0.0});
   return json;

@@ -187,6 +187,31 @@ TEST(FloorRemover, UsesThePreviousFloorThenTheMountsWhenACrowdHidesIt) {
       << "a stamp before the fit's";
 }
 
+TEST(FloorRemover, AWideLowBoxDoesNotKeepTheFloorFromBeingFound) {
+  // 0.7 m of box 1.5 m ahead: two columns in five see its flat top. The robot has pitched since the last
+  // frame.
+  Scene scene;
+  scene.floor();
+  scene.wall(6.0);
+  scene.box(1.5, -0.35, 0.4, 0.7, 0.0, 0.05);
+  const Eigen::Isometry3d truth = mount(0.5, -1.8, 0.0);
+  FloorRemover remover{FloorRemovalConfig{}};
+  const Seen seen = look(&remover, test::render(scene, kinect_camera(), truth), mount());
+  EXPECT_EQ(seen.floor.source, FloorSource::kFrame);
+  EXPECT_NEAR(std::asin(-seen.floor.plane.up.z()) * 180 / M_PI, -1.8, 0.2);
+  EXPECT_NEAR(seen.profile.z_m[320], 1.5, 0.06);
+}
+
+TEST(FloorRemover, FloorSeenBeyondAHoleAtTheRobotsFeetIsNotFree) {
+  // Floor to 1.0 m, below the view's edge; then nothing; floor again from 6 m and a wall at 8 m.
+  Scene scene;
+  scene.floor(0.0, -50.0, 1.0);
+  scene.floor(0.0, 6.0, 9.0);
+  scene.wall(8.0);
+  const Seen seen = look(scene, mount());
+  for (std::size_t u = 0; u < 640; ++u) ASSERT_TRUE(std::isnan(seen.profile.free_to_m[u])) << u;
+}
+
 TEST(FloorRemover, StairsDownAreUnknownNeverFree) {
   // Floor to 2.5 m, then steps down, and a wall across the stairwell at 6 m that answers.
   Scene scene;

@@ -1,0 +1,224 @@
+#include "sensor_benchmark/sensor_statistics.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/pose2.h"
+#include "core/quantile.h"
+#include "kinect_calib/deband.h"
+#include "kinect_calib/kinect_noise.h"
+
+namespace knav {
+namespace {
+
+constexpr int kBorder_px = 16;  // a real Kinect's last columns never answer
+constexpr int kTile_px = 16;
+constexpr double kFlat_codes = 1.5;  ///< rms about a surface above which a piece is not flat
+constexpr double kPatchFill = 0.98;  ///< of its pixels must answer
+constexpr double kTileFill = 0.3;
+
+/// Least squares fit of a surface with the given terms to the readings of a window; residuals, NaN where
+/// none.
+template <int Terms, class TermsOf>
+bool fit_surface(const cv::Mat& codes, double least_fill, const TermsOf& terms_of,
+                 Eigen::Matrix<double, Terms, 1>* surface, cv::Mat* residual, double* fill) {
+  Eigen::Matrix<double, Terms, Terms> A = Eigen::Matrix<double, Terms, Terms>::Identity() * 1e-9;
+  Eigen::Matrix<double, Terms, 1> b = Eigen::Matrix<double, Terms, 1>::Zero();
+  int count = 0;
+  for (int v = 0; v < codes.rows; ++v) {
+    for (int u = 0; u < codes.cols; ++u) {
+      const float code = codes.at<float>(v, u);
+      if (std::isnan(code)) continue;
+      const Eigen::Matrix<double, Terms, 1> terms = terms_of(u, v);
+      A += terms * terms.transpose();
+      b += terms * static_cast<double>(code);
+      ++count;
+    }
+  }
+  *fill = static_cast<double>(count) / (codes.rows * codes.cols);
+  if (*fill < least_fill) return false;
+  *surface = A.ldlt().solve(b);
+  residual->create(codes.rows, codes.cols, CV_32FC1);
+  for (int v = 0; v < codes.rows; ++v) {
+    for (int u = 0; u < codes.cols; ++u) {
+      residual->at<float>(v, u) = codes.at<float>(v, u) - static_cast<float>(surface->dot(terms_of(u, v)));
+    }
+  }
+  return true;
+}
+
+Eigen::Matrix<double, 6, 1> quadratic_terms(double u, double v) {
+  const double a = u / 64.0, b = v / 64.0;
+  Eigen::Matrix<double, 6, 1> terms;
+  terms << 1.0, a, b, a * b, a * a, b * b;
+  return terms;
+}
+
+double rms(const cv::Mat& residual) {
+  double sum = 0.0, count = 0.0;
+  for (int v = 0; v < residual.rows; ++v) {
+    for (int u = 0; u < residual.cols; ++u) {
+      const double r = residual.at<float>(v, u);
+      if (std::isnan(r)) continue;
+      sum += r * r;
+      count += 1.0;
+    }
+  }
+  return std::sqrt(sum / std::max(1.0, count));
+}
+
+double correlation_at(const cv::Mat& residual, int lag, double sd) {
+  double sum = 0.0, count = 0.0;
+  for (int v = 0; v < residual.rows; ++v) {
+    for (int u = 0; u + lag < residual.cols; ++u) {
+      const double product = static_cast<double>(residual.at<float>(v, u)) * residual.at<float>(v, u + lag);
+      if (std::isnan(product)) continue;
+      sum += product;
+      count += 1.0;
+    }
+  }
+  return sum / std::max(1.0, count) / (sd * sd);
+}
+
+int bin_of(double value, const double* edges, int bins) {
+  for (int i = 0; i < bins; ++i) {
+    if (value >= edges[i] && value < edges[i + 1]) return i;
+  }
+  return -1;
+}
+
+cv::Mat codes_of(const cv::Mat& depth_m) {
+  cv::Mat codes(depth_m.rows, depth_m.cols, CV_32FC1);
+  for (int v = 0; v < depth_m.rows; ++v) {
+    for (int u = 0; u < depth_m.cols; ++u) {
+      codes.at<float>(v, u) = static_cast<float>(1.0 / (kInverseDepthPerCode * depth_m.at<float>(v, u)));
+    }
+  }
+  return codes;
+}
+
+}  // namespace
+
+void SensorStatistics::add(const cv::Mat& depth_m, const PinholeModel& camera) {
+  ++frames_;
+  const cv::Mat codes = codes_of(depth_m);
+  add_patches(codes);
+  add_tiles(codes, camera);
+  add_levels(codes);
+  if (walls_) add_bands(depth_m);
+}
+
+void SensorStatistics::add_patches(const cv::Mat& codes) {
+  Eigen::Matrix<double, 6, 1> surface;
+  cv::Mat residual;
+  double fill = 0.0;
+  for (int v = 0; v + patch_px_ <= codes.rows; v += patch_px_) {
+    for (int u = kBorder_px; u + patch_px_ <= codes.cols - kBorder_px; u += patch_px_) {
+      const cv::Mat window = codes(cv::Rect(u, v, patch_px_, patch_px_));
+      if (!fit_surface<6>(window, kPatchFill, quadratic_terms, &surface, &residual, &fill)) continue;
+      const double sd = rms(residual);
+      if (sd > kFlat_codes || sd < 1e-3) continue;
+      sd_.push_back(sd);
+      for (std::size_t i = 0; i < kLags_px.size(); ++i) {
+        correlation_[i].push_back(correlation_at(residual, kLags_px[i], sd));
+      }
+    }
+  }
+}
+
+void SensorStatistics::add_tiles(const cv::Mat& codes, const PinholeModel& camera) {
+  Eigen::Vector3d gradient;
+  cv::Mat residual;
+  double fill = 0.0;
+  for (int v = 0; v + kTile_px <= codes.rows; v += kTile_px) {
+    for (int u = kBorder_px; u + kTile_px <= codes.cols - kBorder_px; u += kTile_px) {
+      // A plane is linear in inverse depth: 1 / z = gradient . ray, and the gradient is its normal.
+      const auto ray = [&](double du, double dv) {
+        return Eigen::Vector3d((u + du - camera.cx_px) / camera.fx_px, (v + dv - camera.cy_px) / camera.fy_px,
+                               1.0);
+      };
+      const cv::Mat window = codes(cv::Rect(u, v, kTile_px, kTile_px));
+      if (!fit_surface<3>(window, kTileFill, ray, &gradient, &residual, &fill)) continue;
+      if (rms(residual) > kFlat_codes) continue;
+      const Eigen::Vector3d middle = ray(0.5 * kTile_px, 0.5 * kTile_px);
+      const double depth_m = 1.0 / (kInverseDepthPerCode * gradient.dot(middle));
+      const double cosine = std::abs(gradient.dot(middle)) / (gradient.norm() * middle.norm());
+      const int i = bin_of(depth_m, kDepth_m.data(), kDepthBins);
+      const int j =
+          bin_of(std::acos(std::min(1.0, cosine)) * 180.0 / kPi, kIncidence_deg.data(), kIncidenceBins);
+      if (i < 0 || j < 0) continue;
+      valid_tiles_[i][j] += 1.0;
+      valid_sum_[i][j] += fill;
+    }
+  }
+}
+
+void SensorStatistics::add_bands(const cv::Mat& depth_m) {
+  Debander debander;
+  cv::Mat copy = depth_m.clone();
+  debander.remove_bands(&copy);
+  const std::vector<double>& band = debander.band_per_m();
+  for (std::size_t u = kBorder_px; u + kBorder_px < band.size(); ++u) {
+    const double step = (band[u] - band[u - 1]) / kInverseDepthPerCode;
+    if (std::abs(step) > 1e-6) band_steps_.push_back(step);
+  }
+}
+
+void SensorStatistics::add_levels(const cv::Mat& codes) {
+  std::vector<double> values;
+  std::set<int> different;
+  for (int v = 0; v < codes.rows; ++v) {
+    for (int u = 0; u < codes.cols; ++u) {
+      if (!std::isnan(codes.at<float>(v, u))) values.push_back(codes.at<float>(v, u));
+    }
+  }
+  if (values.size() < 1000) return;
+  const double low = quantile(values, 0.01), high = quantile(values, 0.99);
+  // Nearer than 0.6 m millimetres are coarser than codes.
+  if (high - low < 3.0) return;
+  for (const double value : values) {
+    if (value >= low && value <= high) different.insert(static_cast<int>(std::lround(4.0 * value)));
+  }
+  levels_per_code_.push_back(static_cast<double>(different.size()) / (high - low + 1.0));
+}
+
+double SensorStatistics::residual_sd_codes() const { return quantile(sd_, 0.5); }
+
+double SensorStatistics::autocorrelation(int lag) const { return quantile(correlation_[lag], 0.5); }
+
+double SensorStatistics::band_step_codes() const {
+  double sum = 0.0;
+  for (const double step : band_steps_) sum += step * step;
+  return std::sqrt(sum / static_cast<double>(band_steps_.size()));
+}
+
+double SensorStatistics::bands_per_frame() const {
+  return static_cast<double>(band_steps_.size()) / std::max(1, frames_);
+}
+
+double SensorStatistics::levels_per_code() const { return quantile(levels_per_code_, 0.5); }
+
+SensorStatistics::Valid SensorStatistics::valid(int depth_bin, int incidence_bin) const {
+  const double tiles = valid_tiles_[depth_bin][incidence_bin];
+  return {tiles, valid_sum_[depth_bin][incidence_bin] / std::max(1.0, tiles)};
+}
+
+cv::Mat residual_picture(const cv::Mat& depth_m) {
+  Eigen::Matrix<double, 6, 1> surface;
+  cv::Mat residual, picture(depth_m.rows, depth_m.cols, CV_8UC1, cv::Scalar(0));
+  double fill = 0.0;
+  if (!fit_surface<6>(codes_of(depth_m), 0.1, quadratic_terms, &surface, &residual, &fill)) return picture;
+  for (int v = 0; v < picture.rows; ++v) {
+    for (int u = 0; u < picture.cols; ++u) {
+      const float r = residual.at<float>(v, u);
+      if (!std::isnan(r))
+        picture.at<std::uint8_t>(v, u) =
+            static_cast<std::uint8_t>(std::clamp(128.0f + 42.0f * r, 1.0f, 255.0f));
+    }
+  }
+  return picture;
+}
+
+}  // namespace knav

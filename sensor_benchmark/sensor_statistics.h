@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <opencv2/core.hpp>
+#include <set>
+#include <vector>
+
+#include "core/camera_model.h"
+
+namespace knav {
+
+/// What tells one depth sensor's frames from another's, gathered from any frames with flat pieces in them:
+/// the same measure for real and for simulated ones. Works on disparity codes of 1/8 px (1 / depth over
+/// kInverseDepthPerCode).
+class SensorStatistics {
+ public:
+  static constexpr int kDepthBins = 3, kIncidenceBins = 4;
+  static constexpr std::array<double, kDepthBins + 1> kDepth_m = {0.5, 1.2, 2.0, 4.0};
+  static constexpr std::array<double, kIncidenceBins + 1> kIncidence_deg = {0, 30, 50, 65, 80};
+  static constexpr std::array<int, 3> kLags_px = {1, 4, 8};
+
+  /// @param patch_px side of the patches that a quadratic surface is fitted to
+  /// @param walls    the frames show one flat wall each: look for vertical bands too
+  SensorStatistics(int patch_px, bool walls) : patch_px_(patch_px), walls_(walls) {}
+  /// @param depth_m 32FC1 m, NaN invalid
+  void add(const cv::Mat& depth_m, const PinholeModel& camera);
+
+  int frames() const { return frames_; }
+  int patches() const { return static_cast<int>(sd_.size()); }
+  double residual_sd_codes() const;       ///< median over flat patches
+  double autocorrelation(int lag) const;  ///< along rows; lag is an index of kLags_px
+  double band_step_codes() const;         ///< rms of the steps between vertical bands; NaN without walls
+  double bands_per_frame() const;
+  /// Different readings per code between the 1st and the 99th percentile of all readings.
+  double levels_per_code() const;
+  struct Valid {
+    double tiles = 0.0, fraction = 0.0;
+  };
+  /// Share of the pixels of flat 16 x 16 tiles that answer, by the tile's depth and the rays' incidence.
+  Valid valid(int depth_bin, int incidence_bin) const;
+
+ private:
+  void add_patches(const cv::Mat& codes);
+  void add_tiles(const cv::Mat& codes, const PinholeModel& camera);
+  void add_bands(const cv::Mat& depth_m);
+  void add_levels(const cv::Mat& codes);
+
+  int patch_px_;
+  bool walls_;
+  int frames_ = 0;
+  std::vector<double> sd_, correlation_[3], band_steps_, levels_per_code_;
+  double valid_sum_[kDepthBins][kIncidenceBins] = {}, valid_tiles_[kDepthBins][kIncidenceBins] = {};
+};
+
+/// Residuals of a wall about one quadratic surface, 8-bit grey: +-3 codes.
+cv::Mat residual_picture(const cv::Mat& depth_m);
+
+}  // namespace knav
