@@ -16,6 +16,7 @@ constexpr int kFieldWidth = 1024, kFieldHeight = 512;
 constexpr int kBoxWidth = 8, kBoxHeight = 11;
 constexpr double kFieldUnit = 1.0 / 4096.0;  ///< codes per count
 
+constexpr float kBandCentre_px = 320.5f;
 constexpr float kFarthest_m = 40.0f;    ///< nothing comes back from beyond
 constexpr float kShadow_codes = 12.0f;  ///< a pixel whose projector column is this much nearer lies in shadow
 
@@ -75,7 +76,7 @@ KinectConfig KinectConfig::preset(const std::string& name) {
     config.band_codes /= 2.0;
   } else if (name == "harsh") {
     config.offset_at_10m = 0.16;  // more than 10 % at 15-20 m over most of the image
-    config.band_codes = 0.6;
+    config.band_codes = 1.5;
     config.noise_codes = 0.70;
     config.dropout_signal = 0.04;
   }
@@ -86,7 +87,15 @@ KinectModel::KinectModel(const KinectConfig& config, const PinholeModel& camera,
                          std::uint64_t device_seed)
     : config_(config), camera_(camera), seed_(seed), device_seed_(device_seed) {
   const auto width = static_cast<std::size_t>(camera.width_px);
-  band_codes_.assign(width, 0.0f);
+  // Vertical bands, as the twelve walls in realdata show them: the reading jumps by one code at regular
+  // columns, counted from the middle, and creeps back in between. Six jumps across the image at 0.56 m,
+  // twelve at 1.4 m on one device, 11 to 14 on the other: their number falls with inverse depth.
+  RandomStream bands(device_seed, random_stream::kSimBands, 0, 0);
+  bands_far_ = static_cast<float>(bands.uniform(14.0, 17.0));
+  bands_per_inverse_m_ = static_cast<float>(bands.uniform(4.3, 4.9));
+  for (int u = 0; u < camera.width_px; ++u) {
+    band_position_.push_back((static_cast<float>(u) - kBandCentre_px) / static_cast<float>(camera.width_px));
+  }
   codes_.assign(width, 0.0f);
   reading_.assign(width, 0);
   lit_codes_.assign(2 * width, 0.0f);
@@ -124,27 +133,12 @@ void KinectModel::make_offset(std::uint64_t device_seed) {
   offset_codes_ = offset_px_ * 8.0;
 }
 
-void KinectModel::start_frame(std::uint64_t frame_index, double stamp_s) {
+void KinectModel::start_frame(std::uint64_t frame_index) {
   RandomStream random(seed_, random_stream::kSimDepth, frame_index, 0x40000000u);
   noise_column_ = random.bits();
   noise_row_ = random.bits();
   texture_column_ = random.bits();
   texture_row_ = random.bits();
-  // Bands: eight steps across the image that creep sideways and swell over tens of seconds.
-  const double width = camera_.width_px;
-  for (std::size_t u = 0; u < band_codes_.size(); ++u) {
-    const double x = static_cast<double>(u) / width;
-    double value = 0.0;
-    for (std::uint32_t k = 0; k < 2; ++k) {
-      RandomStream device(device_seed_, random_stream::kSimBands, k, 0);
-      const double bands = k == 0 ? 8.0 : 5.0, drift = device.uniform(-0.02, 0.02),
-                   phase = device.uniform(0, 2 * kPi);
-      const double swell = 0.7 + 0.3 * std::sin(2 * kPi * stamp_s / device.uniform(20, 60));
-      value +=
-          swell * std::tanh(4.0 * std::sin(2 * kPi * (bands * x / 2 + drift * stamp_s) + phase)) / (k + 1);
-    }
-    band_codes_[u] = static_cast<float>(config_.band_codes * value / 1.5);
-  }
 }
 
 void KinectModel::mark_lit(const float* codes) {
@@ -187,7 +181,9 @@ void KinectModel::sense_row(int row, const TrueRow& in, std::uint16_t* depth_mm)
   const std::int16_t* noise = field(noise_column_, noise_row_);
   const std::int16_t* texture = field(texture_column_, texture_row_);
   const float* offset = offset_codes_.ptr<float>(row);
-  const float* band = band_codes_.data();
+  const float* position = band_position_.data();
+  const auto step = static_cast<float>(config_.band_codes);
+  const float bands_per_code = bands_per_inverse_m_ / fb_codes;
   const float* signal = in.signal;
   const auto unit = static_cast<float>(kFieldUnit);
   const float noise_unit = noise_sd_ * unit;
@@ -199,8 +195,10 @@ void KinectModel::sense_row(int row, const TrueRow& in, std::uint16_t* depth_mm)
   for (int u = 0; u < width; ++u) {
     // Codes below the one of infinity. The noise grows where they saturate: anything may come there.
     const float far = std::max(0.0f, saturation_codes - codes[u]);
+    const float phase = position[u] * (bands_far_ - bands_per_code * codes[u]) + 64.0f;
+    const float band = step * (0.5f - (phase - static_cast<float>(static_cast<std::int32_t>(phase))));
     float code =
-        codes[u] - offset[u] - band[u] + (1.0f + 2.0f * far) * noise_unit * static_cast<float>(noise[u]);
+        codes[u] - offset[u] - band + (1.0f + 2.0f * far) * noise_unit * static_cast<float>(noise[u]);
     code = std::max(static_cast<float>(static_cast<std::int32_t>(code + 0.5f)), farthest_codes);
     const float mm = 1000.0f * fb_codes / code;
     const float fall = 1.0f + z_m[u] * z_m[u] * 0.01f;

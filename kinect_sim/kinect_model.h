@@ -17,11 +17,11 @@ struct KinectConfig {
   double saturation_m = 20.0;  ///< beyond this anything may come
   double max_range_m = 26.0;   ///< largest value given out
   bool quantize = true;
-  double noise_codes = 0.55;  ///< sd of the quantised readings; 0 = none
+  double noise_codes = 0.52;  ///< sd of the quantised readings; 0 = none
   double offset_at_10m =
-      0.10;                  ///< largest relative error at 10 m of the device's ring-shaped disparity offset
-  double band_codes = 0.25;  ///< amplitude of the vertical bands
-  bool shadow = true;        ///< pixels the projector does not light
+      0.10;                 ///< largest relative error at 10 m of the device's ring-shaped disparity offset
+  double band_codes = 1.0;  ///< step between two vertical bands
+  bool shadow = true;       ///< pixels the projector does not light
   double dropout_signal = 0.02;  ///< signal below which a pixel gives nothing; 0 = never
 
   /// ideal: exact depth; calibrated: what a calibration leaves; default: a device as bought; harsh: a bad
@@ -42,7 +42,7 @@ class KinectModel {
   KinectModel(const KinectConfig& config, const PinholeModel& camera, std::uint64_t seed,
               std::uint64_t device_seed);
 
-  void start_frame(std::uint64_t frame_index, double stamp_s);
+  void start_frame(std::uint64_t frame_index);
   /// @param depth_mm one row of the output, 0 = invalid
   void sense_row(int row, const TrueRow& in, std::uint16_t* depth_mm);
 
@@ -60,7 +60,8 @@ class KinectModel {
   cv::Mat offset_px_, offset_codes_;
   std::vector<std::int16_t> noise_;  ///< sd 1
   float noise_sd_ = 0.0f;
-  std::vector<float> band_codes_, codes_;
+  std::vector<float> band_position_, codes_;
+  float bands_far_ = 0.0f, bands_per_inverse_m_ = 0.0f;  ///< steps across the image
   std::vector<std::int32_t> reading_;
   std::vector<float> lit_codes_;  ///< nearest disparity [codes] per projector column
   std::uint32_t noise_column_ = 0, noise_row_ = 0, texture_column_ = 0, texture_row_ = 0;

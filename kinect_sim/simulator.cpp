@@ -207,7 +207,7 @@ void Simulator::for_each_row(const FrameRequest& request, DepthRenderer& rendere
 void Simulator::render(const FrameRequest& request, cv::Mat* depth_mm) {
   Rendering& r = *rendering_;
   depth_mm->create(r.camera.height_px, r.camera.width_px, CV_16UC1);
-  r.kinect.start_frame(request.index, request.stamp_s);
+  r.kinect.start_frame(request.index);
   for_each_row(request, r.renderer, r.camera.height_px, [&](int v, const Eigen::Isometry3f& T_world_optical) {
     r.renderer.render_row(T_world_optical, v, r.z_m.data(), r.signal.data());
     r.kinect.sense_row(v, {r.z_m.data(), r.signal.data()}, depth_mm->ptr<std::uint16_t>(v));

@@ -121,7 +121,7 @@ class Comparison {
           optical_frame(camera_mount({0.0, 0.0, random.uniform(1.3, 1.55)}, 0.0, random.uniform(20.0, 31.0),
                                      random.uniform(-8.0, 1.0)));
       sensor.sense(
-          frame, 100.0 + 0.2 * static_cast<double>(frame), [&](double) { return pose; }, &depth_mm);
+          frame, [&](double) { return pose; }, &depth_mm);
       room_[1].add(metres(depth_mm, [](int mm) { return 0.001 * mm; }), sensor.camera());
       progress.update(0.3 + 0.7 * static_cast<double>(i) / static_cast<double>(files.size()), "room");
     }
@@ -162,7 +162,8 @@ class Comparison {
       const cv::Mat real = metres(
           read_image(file), [&](int d) { return d >= 2047 ? 0.0 : 1.0 / (device.dc1 * d + device.dc0); });
       const WallPlane plane = plane_of(real, device.camera);
-      WallView view(KinectConfig::preset("default"), ++seed, 101 + seed % 5);
+      ++seed;
+      WallView view(KinectConfig::preset("default"), seed, 101 + seed % 5);
       cv::Mat simulated;
       view.sense(plane.distance_m, plane.tilt_x, plane.tilt_y, &simulated);
       walls_[0].add(real, device.camera);

@@ -29,7 +29,7 @@ WallView::WallView(const KinectConfig& kinect, std::uint64_t seed, std::uint64_t
 
 void WallView::sense(double distance_m, double tilt_x, double tilt_y, cv::Mat* depth_m) {
   depth_m->create(camera_.height_px, camera_.width_px, CV_32FC1);
-  kinect_.start_frame(frame_, 100.0 + 0.5 * static_cast<double>(frame_));
+  kinect_.start_frame(frame_);
   ++frame_;
   const double brightness = albedo(Material::kWall);
   for (int v = 0; v < camera_.height_px; ++v) {

@@ -148,7 +148,7 @@ nlohmann::json measure_rolling_shutter(const SensorBenchmarkOptions& options, De
       const auto optical = [&](double after_s) { return isometry(base(after_s)) * T_base_optical; };
       PoseBuffer odometry;
       for (int i = -10; i <= 10; ++i) odometry.add(stamp_s + 0.02 * i, base(0.02 * i));
-      sensor.sense(static_cast<std::uint64_t>(frame), stamp_s, optical, &depth_mm);
+      sensor.sense(static_cast<std::uint64_t>(frame), optical, &depth_mm);
       corrector.correct(depth_mm, sensor.camera(), &rectified);
       const std::vector<Edge> edges = true_edges(pillars, sensor.camera(), optical(0.0));
       for (std::size_t m = 0; m < methods.size(); ++m) {

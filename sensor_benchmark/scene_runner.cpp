@@ -64,7 +64,7 @@ const SceneRunner::View& SceneRunner::look(const Way& way, const Sway& sway, dou
     return isometry(way(t_s + after_s)) * sway.T_base_optical(t_s + after_s);
   };
   const double stamp_s = 100.0 + t_s;
-  sensor_.sense(frame_++, stamp_s, pose, &depth_mm_);
+  sensor_.sense(frame_++, pose, &depth_mm_);
   view_.T_world_base = way(t_s);
   view_.T_base_optical = sway.T_base_optical(t_s);
   sensor_.true_depth(pose(0.0), &view_.true_depth_m);

@@ -27,8 +27,7 @@ SimulatedSensor::SimulatedSensor(const WorldConfig& world, const KinectConfig& k
   state_.timed_solid_present.assign(world.timed_solids.size(), 0);
 }
 
-void SimulatedSensor::sense(std::uint64_t frame, double stamp_s, const PoseAfterStamp& T_world_optical,
-                            cv::Mat* depth_mm) {
+void SimulatedSensor::sense(std::uint64_t frame, const PoseAfterStamp& T_world_optical, cv::Mat* depth_mm) {
   depth_mm->create(camera_.height_px, camera_.width_px, CV_16UC1);
   const int last = camera_.height_px - 1;
   const auto pose = [&](int row) {
@@ -36,7 +35,7 @@ void SimulatedSensor::sense(std::uint64_t frame, double stamp_s, const PoseAfter
         T_world_optical((static_cast<double>(row) / last - 0.5) * kReadout_s).cast<float>());
   };
   renderer_.start_frame(state_, pose(0), pose(last));
-  kinect_.start_frame(frame, stamp_s);
+  kinect_.start_frame(frame);
   for (int v = 0; v <= last; ++v) {
     renderer_.render_row(pose(v), v, z_m_.data(), signal_.data());
     kinect_.sense_row(v, {z_m_.data(), signal_.data()}, depth_mm->ptr<std::uint16_t>(v));

@@ -29,7 +29,7 @@ class SimulatedSensor {
   /// Where the camera's optical frame is, some seconds after (before, if negative) the frame's stamp.
   using PoseAfterStamp = std::function<Eigen::Isometry3d(double after_s)>;
   /// 16UC1 mm, 0 = invalid; rows read one after another, the stamp means the middle one.
-  void sense(std::uint64_t frame, double stamp_s, const PoseAfterStamp& T_world_optical, cv::Mat* depth_mm);
+  void sense(std::uint64_t frame, const PoseAfterStamp& T_world_optical, cv::Mat* depth_mm);
   /// 32FC1 m, NaN = nothing there; all rows from the one pose.
   void true_depth(const Eigen::Isometry3d& T_world_optical, cv::Mat* depth_m);
 

@@ -16,7 +16,7 @@ cv::Mat sense_wall(KinectModel& kinect, double z_m, double tilt_per_px, std::uin
                    float signal = 0.6f) {
   cv::Mat out(480, 640, CV_16UC1);
   std::vector<float> z(640), s(640, signal);
-  kinect.start_frame(frame, 100.0);
+  kinect.start_frame(frame);
   for (int v = 0; v < 480; ++v) {
     for (int u = 0; u < 640; ++u) {
       z[static_cast<std::size_t>(u)] =
@@ -91,6 +91,35 @@ TEST(KinectModel, NoiseHasTheRealWallsDeviationAndCorrelation) {
   }
 }
 
+TEST(KinectModel, BandsAreStepsOfOneCodeThatLieCloserOnFartherWalls) {
+  KinectConfig config = KinectConfig::preset("default");
+  config.dropout_signal = config.offset_at_10m = 0.0;
+  config.noise_codes = 0.5;
+  config.shadow = false;
+  int last = 0;
+  for (const double z_m : {0.6, 1.0, 1.5}) {
+    KinectModel kinect(config, kCamera, 3, 7);
+    const cv::Mat depth = sense_wall(kinect, z_m, 0.0, 5);
+    std::vector<double> column(640, 0.0);  // mean code
+    for (int u = 0; u < 640; ++u) {
+      for (int v = 0; v < 480; ++v)
+        column[static_cast<std::size_t>(u)] += 351000.0 / depth.at<std::uint16_t>(v, u) / 480;
+    }
+    int steps = 0;
+    for (std::size_t u = 1; u < 640; ++u) {
+      const double step = column[u] - column[u - 1];
+      if (std::abs(step) < 0.4) continue;
+      ++steps;
+      EXPECT_NEAR(step, -1.0, 0.3) << z_m << " m, column " << u;  // a code less disparity: farther
+    }
+    // Real walls: 5 and 7 steps at 0.56 and 0.85 m of one device, 11 to 13 at 0.85-1.8 m of the other.
+    EXPECT_GT(steps, last) << z_m;
+    EXPECT_GE(steps, 4) << z_m;
+    EXPECT_LE(steps, 15) << z_m;
+    last = steps;
+  }
+}
+
 TEST(KinectModel, ReadingsAreWholeDisparityCodes) {
   KinectModel kinect(KinectConfig::preset("default"), kCamera, 1, 7);
   const cv::Mat depth = sense_wall(kinect, 4.0, 1e-5, 0);
@@ -146,7 +175,7 @@ TEST(KinectModel, TheShadowFallsToTheLeftOfNearThingsAsWideAsTheDisparitiesDiffe
   std::vector<float> z(640, 4.0f), s(640, 0.6f);
   for (std::size_t u = 300; u < 400; ++u) z[u] = 1.0f;
   std::vector<std::uint16_t> out(640);
-  kinect.start_frame(0, 0.0);
+  kinect.start_frame(0);
   kinect.sense_row(100, {z.data(), s.data()}, out.data());
   // 43.875 px at 1 m, 10.97 px at 4 m: 33 columns to the left are dark.
   const auto dark = std::count(out.begin(), out.end(), std::uint16_t{0});
