@@ -55,6 +55,8 @@ void EdgeStraightener::add_row(int v, const float* unrolled_m, const RowWarp& wa
     for (std::size_t u = word; u < word + 8; ++u) {
       if (jump_[u] == 0 || edges_.size() - begin >= kMostEdgesPerRow) continue;
       const float shift = warp.shift_px(static_cast<int>(u));
+      const float from = static_cast<float>(u) + std::floor(shift + 0.5f);
+      if (from < 1.0f || from >= static_cast<float>(width_px_)) continue;  // the edge of the image itself
       const float left = unrolled_m[u - 1], right = unrolled_m[u];
       Edge edge;
       edge.at_px = static_cast<float>(u) - 0.5f + (std::floor(shift + 0.5f) - shift);

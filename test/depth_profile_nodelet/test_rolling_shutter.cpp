@@ -105,7 +105,7 @@ TEST(RollingShutter, StraighteningCoversNoThinPoleAndLeavesSlantsAlone) {
   }
   Scene leaning;
   leaning.wall(4.0, -50, 100, -5.0, 5.0);
-  leaning.patches.push_back({{2.0, -0.5, -1.0}, {0, 0.3, 0}, {0, 0.728, 2.0}});
+  leaning.patches.push_back({{2.0, -0.5, -1.0}, {0, 0.2819, -0.1026}, {0, 0.728, 2.0}});
   const cv::Mat sheared = turning_view(leaning, 1.0);
   cv::Mat plain, straight;
   RollingShutterCorrector without(plain_config), with{RollingShutterConfig{}};
