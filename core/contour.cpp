@@ -82,7 +82,7 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
   int positive_ix = 0, positive_iy = 0;  // its quad; the value there is only worked out at a crossing
   RayEnd end;
   const auto value_at = [&](int ix, int iy, double t) {
-    return value_in(quads[grid.index(ix, iy)], static_cast<float>(x + t * dir_x - ix),
+    return value_in(quads[grid.quad_index(ix, iy)], static_cast<float>(x + t * dir_x - ix),
                     static_cast<float>(y + t * dir_y - iy));
   };
   const auto inside = static_cast<unsigned>(grid.size_cells() - 1);
@@ -92,7 +92,7 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
         static_cast<unsigned>(walk.iy - first_y) >= inside)
       break;
     const double leaves = std::min(walk.leaves_at(), length);
-    const std::uint32_t quad = quads[grid.index(walk.ix, walk.iy)];
+    const std::uint32_t quad = quads[grid.quad_index(walk.ix, walk.iy)];
     if ((quad & kSigns) == 0 && quad != 0) {  // all corners known and none negative
       positive_at = leaves;
       positive_ix = walk.ix;

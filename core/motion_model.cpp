@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/fast_math.h"
 #include "core/random.h"
 
 namespace knav {
@@ -18,12 +19,18 @@ void sample_motion(const MotionModelConfig& config, const Pose2& T_before_after,
       std::hypot(sideways_ratio * distance, config.translation_per_rotation * turn, config.translation_floor_m);
   const double turn_sd = std::hypot(config.rotation_per_translation * distance, config.rotation_per_rotation * turn,
                                     config.rotation_floor_rad);
+  static thread_local std::vector<double> cosine, sine;
+  cosine.resize(particles.size());
+  sine.resize(particles.size());
+  cos_sin(particles.yaw_rad.data(), particles.size(), cosine.data(), sine.data());
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    RandomStream random(seed, stream, step, static_cast<std::uint32_t>(i));
-    const double along = random.normal(), across = random.normal(), yaw = random.normal();
-    const Pose2 T_before_sample{T_before_after.x_m + forward_sd * along, T_before_after.y_m + sideways_sd * across,
-                                T_before_after.yaw_rad + turn_sd * yaw};
-    particles.set(i, particles.pose(i) * T_before_sample);
+    double noise[3];
+    three_normals(seed, stream, step, static_cast<std::uint32_t>(i), noise);
+    const double x = T_before_after.x_m + forward_sd * noise[0], y = T_before_after.y_m + sideways_sd * noise[1];
+    const double yaw = particles.yaw_rad[i] + T_before_after.yaw_rad + turn_sd * noise[2];
+    particles.x_m[i] += cosine[i] * x - sine[i] * y;
+    particles.y_m[i] += sine[i] * x + cosine[i] * y;
+    particles.yaw_rad[i] = yaw - 2.0 * kPi * rounded(yaw / (2.0 * kPi));
   }
 }
 

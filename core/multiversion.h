@@ -9,3 +9,21 @@
 #else
 #define KNAV_MULTIVERSION
 #endif
+
+/// Where the compiler finds no vector code, functions written with intrinsics are marked KNAV_AVX2 and called only if
+/// cpu_has_avx2().
+#ifdef __x86_64__
+#define KNAV_HAVE_AVX2_CODE 1
+#define KNAV_AVX2 __attribute__((target("avx2")))
+#endif
+
+namespace knav {
+inline bool cpu_has_avx2() {
+#ifdef KNAV_HAVE_AVX2_CODE
+  static const bool has = __builtin_cpu_supports("avx2") != 0;
+  return has;
+#else
+  return false;
+#endif
+}
+}  // namespace knav

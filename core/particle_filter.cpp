@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/fast_math.h"
+
 namespace knav {
 
 void ParticleSet::resize(std::size_t count) {
@@ -43,22 +45,36 @@ double effective_sample_size(const ParticleSet& particles) {
 
 PoseEstimate weighted_mean(const ParticleSet& particles) {
   PoseEstimate estimate;
+  static thread_local std::vector<double> cosine, sine;
+  cosine.resize(particles.size());
+  sine.resize(particles.size());
+  cos_sin(particles.yaw_rad.data(), particles.size(), cosine.data(), sine.data());
   double sum = 0.0, x = 0.0, y = 0.0, c = 0.0, s = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const double w = particles.weight[i];
     sum += w;
     x += w * particles.x_m[i];
     y += w * particles.y_m[i];
-    c += w * std::cos(particles.yaw_rad[i]);
-    s += w * std::sin(particles.yaw_rad[i]);
+    c += w * cosine[i];
+    s += w * sine[i];
   }
   if (!(sum > 0.0)) return estimate;
   estimate.mean = {x / sum, y / sum, std::atan2(s, c)};
+  double xx = 0.0, xy = 0.0, xt = 0.0, yy = 0.0, yt = 0.0, tt = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    const Eigen::Vector3d d(particles.x_m[i] - estimate.mean.x_m, particles.y_m[i] - estimate.mean.y_m,
-                            normalize_angle_rad(particles.yaw_rad[i] - estimate.mean.yaw_rad));
-    estimate.covariance += particles.weight[i] / sum * d * d.transpose();
+    const double w = particles.weight[i];
+    const double dx = particles.x_m[i] - estimate.mean.x_m, dy = particles.y_m[i] - estimate.mean.y_m;
+    const double turn = particles.yaw_rad[i] - estimate.mean.yaw_rad;
+    const double dt = turn - 2.0 * kPi * rounded(turn / (2.0 * kPi));
+    xx += w * dx * dx;
+    xy += w * dx * dy;
+    xt += w * dx * dt;
+    yy += w * dy * dy;
+    yt += w * dy * dt;
+    tt += w * dt * dt;
   }
+  estimate.covariance << xx, xy, xt, xy, yy, yt, xt, yt, tt;
+  estimate.covariance /= sum;
   return estimate;
 }
 

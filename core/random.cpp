@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/fast_math.h"
 #include "core/pose2.h"
 
 namespace knav {
@@ -53,6 +54,15 @@ double RandomStream::normal() {
   spare_normal_ = radius * std::sin(angle);
   has_spare_normal_ = true;
   return radius * std::cos(angle);
+}
+
+void three_normals(std::uint64_t seed, std::uint32_t stream, std::uint64_t step, std::uint32_t index, double out[3]) {
+  const std::uint32_t key[2] = {static_cast<std::uint32_t>(seed),
+                                static_cast<std::uint32_t>(seed >> 32) ^ (stream * 0x9E3779B9u)};
+  const std::uint32_t counter[4] = {0u, index, static_cast<std::uint32_t>(step), static_cast<std::uint32_t>(step >> 32)};
+  std::uint32_t bits[4];
+  philox4x32_10(counter, key, bits);
+  for (int i = 0; i < 3; ++i) out[i] = normal_from_bits(bits[i]);
 }
 
 }  // namespace knav

@@ -37,6 +37,10 @@ class RandomStream {
 /// The raw generator: four 32-bit words from a 128-bit counter and a 64-bit key.
 void philox4x32_10(const std::uint32_t counter[4], const std::uint32_t key[2], std::uint32_t out[4]);
 
+/// Three standard normal numbers from one draw of RandomStream(seed, stream, step, index), much faster than its
+/// normal(): for thousands of particles a frame.
+void three_normals(std::uint64_t seed, std::uint32_t stream, std::uint64_t step, std::uint32_t index, double out[3]);
+
 /// Every consumer of random numbers has its number here, so that no two share a stream.
 namespace random_stream {
 constexpr std::uint32_t kMotion = 1, kResample = 2, kLocalizerMotion = 3, kLocalizerResample = 4,

@@ -72,33 +72,58 @@ void project_row_angular(const RowProjection& p, int first, int count, std::int3
   }
 }
 
-/// The part of the row at height dy over the sensor that lies in the disc of its reach and in its view.
-bool row_span(const TsdfObservation& o, double dy, double* low, double* high) {
-  const double reach = o.reach_m;
-  const double square = reach * reach - dy * dy;
-  if (square <= 0.0) return false;
-  *high = std::sqrt(square);
-  *low = -*high;
-  // Edge rays, one column wider than the view.
-  const double columns = static_cast<double>(o.columns());
-  double first, last;
-  if (o.pinhole) {
-    first = -std::atan((-1.0 - o.cx_px) / o.fx_px);
-    last = -std::atan((columns - o.cx_px) / o.fx_px);
-  } else {
-    first = o.angle_min_rad - o.angle_increment_rad;
-    last = o.angle_min_rad + o.angle_increment_rad * columns;
+/// The directions of the view's edges, a column wider than it is.
+class View {
+ public:
+  explicit View(const TsdfObservation& o) : reach_m_(o.reach_m) {
+    const double columns = static_cast<double>(o.columns());
+    double first, last;
+    if (o.pinhole) {
+      first = -std::atan((-1.0 - o.cx_px) / o.fx_px);
+      last = -std::atan((columns - o.cx_px) / o.fx_px);
+    } else {
+      first = o.angle_min_rad - o.angle_increment_rad;
+      last = o.angle_min_rad + o.angle_increment_rad * columns;
+    }
+    const double right = o.T_map_sensor.yaw_rad + std::min(first, last);
+    const double left = o.T_map_sensor.yaw_rad + std::max(first, last);
+    all_round_ = left - right >= 2.0 * kPi - 0.02;
+    narrow_ = left - right <= kPi;
+    right_x_ = std::cos(right);
+    right_y_ = std::sin(right);
+    left_x_ = std::cos(left);
+    left_y_ = std::sin(left);
   }
-  const double right = o.T_map_sensor.yaw_rad + std::min(first, last);
-  const double left = o.T_map_sensor.yaw_rad + std::max(first, last);
-  if (left - right >= 2.0 * kPi - 0.02) return true;
-  // The half planes left of the right edge and right of the left edge: a narrow view is their intersection, a
-  // wide one their union.
+
+  /// The part of the row at height dy over the sensor that lies in the disc of its reach and in its view.
+  bool span(double dy, double* low, double* high) const {
+    const double square = reach_m_ * reach_m_ - dy * dy;
+    if (square <= 0.0) return false;
+    *high = std::sqrt(square);
+    *low = -*high;
+    if (all_round_) return true;
+    // The half planes left of the right edge and right of the left edge: a narrow view is their intersection, a
+    // wide one their union.
+    const Span r = clipped(*low, *high, -right_y_, right_x_ * dy);
+    const Span l = clipped(*low, *high, left_y_, -left_x_ * dy);
+    if (narrow_) {
+      *low = std::max(r.low, l.low);
+      *high = std::min(r.high, l.high);
+    } else {
+      const bool r_empty = r.low > r.high, l_empty = l.low > l.high;
+      if (r_empty && l_empty) return false;
+      *low = r_empty ? l.low : l_empty ? r.low : std::min(r.low, l.low);
+      *high = r_empty ? l.high : l_empty ? r.high : std::max(r.high, l.high);
+    }
+    return *low <= *high;
+  }
+
+ private:
   struct Span {
     double low, high;
   };
-  const auto clipped = [&](double a, double b) {  // where a dx + b >= 0
-    Span span{*low, *high};
+  static Span clipped(double low, double high, double a, double b) {  // where a dx + b >= 0
+    Span span{low, high};
     if (a > 1e-9) {
       span.low = std::max(span.low, -b / a);
     } else if (a < -1e-9) {
@@ -107,19 +132,21 @@ bool row_span(const TsdfObservation& o, double dy, double* low, double* high) {
       span.high = span.low - 1.0;
     }
     return span;
-  };
-  const Span r = clipped(-std::sin(right), std::cos(right) * dy);
-  const Span l = clipped(std::sin(left), -std::cos(left) * dy);
-  if (left - right <= kPi) {
-    *low = std::max(r.low, l.low);
-    *high = std::min(r.high, l.high);
-  } else {
-    const bool r_empty = r.low > r.high, l_empty = l.low > l.high;
-    if (r_empty && l_empty) return false;
-    *low = r_empty ? l.low : l_empty ? r.low : std::min(r.low, l.low);
-    *high = r_empty ? l.high : l_empty ? r.high : std::max(r.high, l.high);
   }
-  return *low <= *high;
+
+  double reach_m_;
+  bool all_round_, narrow_;
+  double right_x_, right_y_, left_x_, left_y_;
+};
+
+KNAV_MULTIVERSION
+void pack_quads(const std::int8_t* lower, const std::int8_t* upper, int count, std::uint32_t* quad) {
+  for (int k = 0; k < count; ++k) {
+    quad[k] = static_cast<std::uint32_t>(static_cast<std::uint8_t>(lower[k])) |
+              static_cast<std::uint32_t>(static_cast<std::uint8_t>(lower[k + 1])) << 8 |
+              static_cast<std::uint32_t>(static_cast<std::uint8_t>(upper[k])) << 16 |
+              static_cast<std::uint32_t>(static_cast<std::uint8_t>(upper[k + 1])) << 24;
+  }
 }
 
 }  // namespace
@@ -129,7 +156,7 @@ double TsdfConfig::largest_weight() const {
   return std::floor(std::ldexp(1.0, weight_bits) / floor2 + 0.5);
 }
 
-TsdfGrid::TsdfGrid(const TsdfConfig& config, double half_size_m) : config_(config) {
+TsdfGrid::TsdfGrid(const TsdfConfig& config, double half_size_m, bool vectors) : config_(config) {
   const double cells = 2.0 * half_size_m / config.resolution_m;
   while ((1 << bits_) < cells && bits_ < 15) ++bits_;
   size_ = 1 << bits_;
@@ -137,11 +164,22 @@ TsdfGrid::TsdfGrid(const TsdfConfig& config, double half_size_m) : config_(confi
   first_x_ = first_y_ = -size_ / 2;
   weight_unit_ = static_cast<float>(std::ldexp(1.0, config.weight_bits));
   const std::size_t count = static_cast<std::size_t>(size_) << bits_;
+  rules_.weight_unit = weight_unit_;
+  rules_.weight_range_floor_m = static_cast<float>(config.weight_range_floor_m);
+  rules_.resolution_m = static_cast<float>(config.resolution_m);
+  rules_.contradictions_to_reset = config.contradictions_to_reset;
+  rules_.middle_clear_from_m = static_cast<float>(config.middle_clear_from_m);
+  rules_.standing_clear_to_m = static_cast<float>(config.low_clear_range_m);
+  rules_.front_clear_to_m = static_cast<float>(config.front_clear_range_m);
+  rules_.vectors = vectors;
   weighted_sum_.resize(count);
   weight_.resize(count);
+  standing_weight_.resize(count);
+  value_.resize(count);
   reset_.resize(count);
   last_seen_s_.resize(count);
-  quad_.resize(count);
+  quad_stride_ = size_ + 16;
+  quad_.resize(static_cast<std::size_t>(size_) * static_cast<std::size_t>(quad_stride_));
   contradictions_.resize(count);
   row_column_.resize(static_cast<std::size_t>(size_));
   row_distance_m_.resize(static_cast<std::size_t>(size_));
@@ -156,6 +194,8 @@ int TsdfGrid::cell_of(double coordinate_m) const {
 void TsdfGrid::clear() {
   std::fill(weighted_sum_.begin(), weighted_sum_.end(), 0);
   std::fill(weight_.begin(), weight_.end(), 0);
+  std::fill(standing_weight_.begin(), standing_weight_.end(), 0);
+  std::fill(value_.begin(), value_.end(), kUnknown);
   std::fill(reset_.begin(), reset_.end(), 0u);
   std::fill(last_seen_s_.begin(), last_seen_s_.end(), 0.0f);
   std::fill(quad_.begin(), quad_.end(), 0x80808080u);
@@ -166,10 +206,21 @@ void TsdfGrid::reset_cell(int ix, int iy, std::uint32_t next_sequence) {
   const std::size_t i = index(ix, iy);
   weighted_sum_[i] = 0;
   weight_[i] = 0;
+  standing_weight_[i] = 0;
   reset_[i] = next_sequence;
   last_seen_s_[i] = 0.0f;
   contradictions_[i] = 0;
-  set_value(ix, iy, kUnknown);
+  value_[i] = kUnknown;
+  // The cell is a corner of four quads. The torus' seam mixes both edges of the window; lookups there are outside.
+  const std::uint32_t byte = static_cast<std::uint8_t>(kUnknown);
+  std::uint32_t& a = quad_[quad_index(ix, iy)];
+  a = (a & 0xFFFFFF00u) | byte;
+  std::uint32_t& b = quad_[quad_index(ix - 1, iy)];
+  b = (b & 0xFFFF00FFu) | byte << 8;
+  std::uint32_t& c = quad_[quad_index(ix, iy - 1)];
+  c = (c & 0xFF00FFFFu) | byte << 16;
+  std::uint32_t& d = quad_[quad_index(ix - 1, iy - 1)];
+  d = (d & 0x00FFFFFFu) | byte << 24;
 }
 
 void TsdfGrid::scroll_to(double x_m, double y_m, std::uint32_t next_sequence) {
@@ -198,30 +249,6 @@ void TsdfGrid::scroll_to(double x_m, double y_m, std::uint32_t next_sequence) {
   }
 }
 
-void TsdfGrid::set_value(int ix, int iy, std::int8_t value) {
-  // The cell is a corner of four quads. The torus' seam mixes both edges of the window; lookups there are
-  // outside.
-  const std::uint32_t byte = static_cast<std::uint8_t>(value);
-  std::uint32_t& a = quad_[index(ix, iy)];
-  a = (a & 0xFFFFFF00u) | byte;
-  std::uint32_t& b = quad_[index(ix - 1, iy)];
-  b = (b & 0xFFFF00FFu) | byte << 8;
-  std::uint32_t& c = quad_[index(ix, iy - 1)];
-  c = (c & 0xFF00FFFFu) | byte << 16;
-  std::uint32_t& d = quad_[index(ix - 1, iy - 1)];
-  d = (d & 0x00FFFFFFu) | byte << 24;
-}
-
-void TsdfGrid::refresh(int ix, int iy, std::size_t i) {
-  const std::int32_t w = weight_[i];
-  std::int8_t value = kUnknown;
-  if (w > 0) {
-    const float f = kValueScale * static_cast<float>(weighted_sum_[i]) / static_cast<float>(w);
-    value = static_cast<std::int8_t>(f + (f < 0.0f ? -0.5f : 0.5f));
-  }
-  if (static_cast<std::int8_t>(quad_[i] & 0xFFu) != value) set_value(ix, iy, value);
-}
-
 float TsdfGrid::distance(int ix, int iy) const {
   const std::size_t i = index(ix, iy);
   return weight_[i] > 0 ? static_cast<float>(weighted_sum_[i]) / static_cast<float>(weight_[i])
@@ -238,94 +265,94 @@ void TsdfGrid::remove(const TsdfObservation& observation) { apply<false>(observa
 template <bool kAdd>
 void TsdfGrid::apply(const TsdfObservation& o) {
   if (!(o.reach_m > 0.0f)) return;
+  const View view(o);
   const int radius = static_cast<int>(o.reach_m / config_.resolution_m) + 2;
-  const int sensor_x = cell_of(o.T_map_sensor.x_m), sensor_y = cell_of(o.T_map_sensor.y_m);
+  const int sensor_y = cell_of(o.T_map_sensor.y_m);
+  const auto cos_yaw = static_cast<float>(std::cos(o.T_map_sensor.yaw_rad));
+  const auto sin_yaw = static_cast<float>(std::sin(o.T_map_sensor.yaw_rad));
   const int low_y = std::max(first_y_, sensor_y - radius);
   const int high_y = std::min(first_y_ + size_, sensor_y + radius + 1);
+  TsdfChange below;  // of the row before, in absolute cells
   for (int iy = low_y; iy < high_y; ++iy) {
     double low = 0.0, high = 0.0;
-    if (!row_span(o, center_m(iy) - o.T_map_sensor.y_m, &low, &high)) continue;
-    const int from = std::max(first_x_, cell_of(o.T_map_sensor.x_m + low) - 1);
-    const int to = std::min(first_x_ + size_, cell_of(o.T_map_sensor.x_m + high) + 2);
-    if (from < to) apply_row<kAdd>(o, iy, from - sensor_x, to - sensor_x);
+    TsdfChange change;
+    if (view.span(center_m(iy) - o.T_map_sensor.y_m, &low, &high)) {
+      const int from = std::max(first_x_, cell_of(o.T_map_sensor.x_m + low) - 1);
+      const int to = std::min(first_x_ + size_, cell_of(o.T_map_sensor.x_m + high) + 2);
+      if (from < to) change = apply_row<kAdd>(o, cos_yaw, sin_yaw, iy, from, to);
+    }
+    // A row of quads stands on two rows of cells.
+    if (!below.empty() || !change.empty()) {
+      rebuild_quads(iy - 1, std::min(below.first, change.first) - 1, std::max(below.last, change.last) + 1);
+    }
+    below = change;
   }
+  if (!below.empty()) rebuild_quads(high_y - 1, below.first - 1, below.last + 1);
 }
 
 template <bool kAdd>
-void TsdfGrid::apply_row(const TsdfObservation& o, int iy, int from, int to) {
+TsdfChange TsdfGrid::apply_row(const TsdfObservation& o, float cos_yaw, float sin_yaw, int iy, int from_x, int to_x) {
   // Offsets are counted from the sensor's own cell, an absolute index: a cell's numbers do not depend on
   // where the window lies, so removal after scrolling repeats them to the bit.
   const int sensor_x = cell_of(o.T_map_sensor.x_m), sensor_y = cell_of(o.T_map_sensor.y_m);
   const auto resolution = static_cast<float>(config_.resolution_m);
   RowProjection p;
-  p.cos_yaw = static_cast<float>(std::cos(o.T_map_sensor.yaw_rad));
-  p.sin_yaw = static_cast<float>(std::sin(o.T_map_sensor.yaw_rad));
+  p.cos_yaw = cos_yaw;
+  p.sin_yaw = sin_yaw;
   p.resolution = resolution;
   p.first_dx = static_cast<float>(center_m(sensor_x) - o.T_map_sensor.x_m);
   p.dy = static_cast<float>(center_m(sensor_y) - o.T_map_sensor.y_m) +
          resolution * static_cast<float>(iy - sensor_y);
   p.columns = static_cast<int>(o.columns());
-  const int count = to - from;
+  const int count = to_x - from_x;
   if (o.pinhole) {
     p.column_scale = o.fx_px;
     p.column_shift = o.cx_px + 0.5f;
-    project_row_pinhole(p, from, count, row_column_.data(), row_distance_m_.data());
+    project_row_pinhole(p, from_x - sensor_x, count, row_column_.data(), row_distance_m_.data());
   } else {
     p.column_scale = 1.0f / o.angle_increment_rad;
     p.column_shift = 0.5f - o.angle_min_rad / o.angle_increment_rad;
-    project_row_angular(p, from, count, row_column_.data(), row_distance_m_.data(), row_angle_rad_.data());
+    project_row_angular(p, from_x - sensor_x, count, row_column_.data(), row_distance_m_.data(),
+                        row_angle_rad_.data());
   }
-  const auto floor_m = static_cast<float>(config_.weight_range_floor_m);
-  const float floor2 = floor_m * floor_m;
-  const auto support = static_cast<std::int8_t>(0.6f * kValueScale);
-  const float mu_clear = 2.0f * resolution;
-  for (int k = 0; k < count; ++k) {
-    const std::int32_t column = row_column_[static_cast<std::size_t>(k)];
-    if (column < 0) continue;
-    const auto u = static_cast<std::size_t>(column);
-    const float d = row_distance_m_[static_cast<std::size_t>(k)];
-    const float eta = o.range_m[u] - d;  // NaN without a surface
-    const float mu = o.truncation_m[u];
-    const bool near_surface = eta >= -mu && eta < mu;
-    const bool carved = !near_surface && d >= o.free_from_m[u] && d <= o.free_to_m[u];
-    if (!near_surface && !carved) continue;
-    const float f = near_surface ? eta / mu : 1.0f;  // equation 2: min(1, |eta| / mu) sgn(eta)
-    const float square = d * d > floor2 ? d * d : floor2;
-    float weight = weight_unit_ / square;  // equation 4
-    if (eta < 0.0f) {
-      const float depth = -eta / mu;
-      const float share = depth <= o.behind_full ? 1.0f : (1.0f - depth) / (1.0f - o.behind_full);
-      for (int power = 0; power < o.behind_power; ++power) weight *= share;
-      weight = weight < 1.0f ? 1.0f : weight;  // stays known
-    }
-    const auto w = static_cast<std::int32_t>(weight + 0.5f);
-    const float product = f * static_cast<float>(w);
-    const auto fw = static_cast<std::int32_t>(product + (product < 0.0f ? -0.5f : 0.5f));
-    const int ix = sensor_x + from + k;
-    const std::size_t i = index(ix, iy);
+  TsdfChange all;
+  for (int x = from_x; x < to_x;) {  // the torus cuts a row in two pieces at most
+    const int piece = std::min(to_x - x, size_ - (x & mask_));
+    const std::size_t i = index(x, iy);
+    const TsdfCells cells{&weighted_sum_[i], &weight_[i],         &standing_weight_[i], &reset_[i],
+                          &last_seen_s_[i],  &contradictions_[i], &value_[i]};
+    const std::int32_t* const column = row_column_.data() + (x - from_x);
+    const float* const distance = row_distance_m_.data() + (x - from_x);
+    TsdfChange change;
     if constexpr (kAdd) {
-      const auto held = static_cast<std::int8_t>(quad_[i] & 0xFFu);
-      if (carved && held != kUnknown && held < support && d > o.clear_from_m[u] &&
-          d + mu_clear < o.clear_to_m[u]) {
-        if (++contradictions_[i] >= config_.contradictions_to_reset) {
-          weighted_sum_[i] = 0;
-          weight_[i] = 0;
-          reset_[i] = o.sequence;
-          contradictions_[i] = 0;
-          ++contradicted_;
-        }
-      } else if (near_surface) {
-        contradictions_[i] = 0;
-      }
-      weighted_sum_[i] += fw;
-      weight_[i] += w;
-      last_seen_s_[i] = o.age_clock_s;
+      change = add_to_cells(rules_, o, column, distance, piece, cells, &contradicted_);
     } else {
-      if (reset_[i] > o.sequence) continue;
-      weighted_sum_[i] -= fw;
-      weight_[i] -= w;
+      change = remove_from_cells(rules_, o, column, distance, piece, cells);
     }
-    refresh(ix, iy, i);
+    if (!change.empty()) {
+      all.add(x + change.first);
+      all.add(x + change.last);
+    }
+    x += piece;
+  }
+  return all;
+}
+
+void TsdfGrid::rebuild_quads(int iy, int from_x, int to_x) {
+  const std::size_t lower = index(0, iy), upper = index(0, iy + 1), out = quad_index(0, iy);
+  for (int x = from_x; x < to_x;) {
+    const int i = x & mask_;
+    const int piece = std::min(to_x - x, mask_ - i);
+    if (piece == 0) {  // the seam
+      const std::int8_t left[2] = {value_[lower + static_cast<std::size_t>(i)], value_[lower]};
+      const std::int8_t right[2] = {value_[upper + static_cast<std::size_t>(i)], value_[upper]};
+      pack_quads(left, right, 1, &quad_[out + static_cast<std::size_t>(i)]);
+      ++x;
+      continue;
+    }
+    pack_quads(&value_[lower + static_cast<std::size_t>(i)], &value_[upper + static_cast<std::size_t>(i)], piece,
+               &quad_[out + static_cast<std::size_t>(i)]);
+    x += piece;
   }
 }
 
@@ -334,7 +361,7 @@ float interpolate(const TsdfGrid& grid, double x_m, double y_m, float* value) {
   const double fx = std::floor(gx), fy = std::floor(gy);
   const int ix = static_cast<int>(fx), iy = static_cast<int>(fy);
   if (!grid.contains(ix, iy) || !grid.contains(ix + 1, iy + 1)) return 0.0f;
-  const std::uint32_t quad = grid.quads()[grid.index(ix, iy)];
+  const std::uint32_t quad = grid.quads()[grid.quad_index(ix, iy)];
   const auto tx = static_cast<float>(gx - fx), ty = static_cast<float>(gy - fy);
   const float share[4] = {(1 - tx) * (1 - ty), tx * (1 - ty), (1 - tx) * ty, tx * ty};
   float sum = 0.0f, known = 0.0f;

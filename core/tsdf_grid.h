@@ -6,6 +6,7 @@
 
 #include "core/grid_geometry.h"
 #include "core/tsdf_observation.h"
+#include "core/tsdf_row.h"
 
 namespace knav {
 
@@ -16,6 +17,9 @@ struct TsdfConfig {
   int weight_bits = 16;
   double clear_margin_m = 0.1;
   int contradictions_to_reset = 4;
+  double middle_clear_from_m = 0.6;
+  double low_clear_range_m = 2.5;
+  double front_clear_range_m = 4.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -28,6 +32,14 @@ struct TsdfConfig {
              "A surface is contradicted where rays pass it freely within this distance on both sides.");
     v.integer("contradictions_to_reset", contradictions_to_reset, 1, 255, "frames",
               "A cell that this many frames contradict forgets what it held.");
+    v.number("middle_clear_from_m", middle_clear_from_m, 0, 5, "m",
+             "A surface of middle height is contradicted down to here, nearer than the floor is seen: it would still be "
+             "in view. Low and high ones only where the floor was seen.");
+    v.number("low_clear_range_m", low_clear_range_m, 0, 20, "m",
+             "A surface that was seen as low or high is contradicted up to here; from farther away it need not be seen.");
+    v.number("front_clear_range_m", front_clear_range_m, 0, 20, "m",
+             "Up to here a surface is also contradicted within the truncation before another one (a person who stood at "
+             "a wall); 0 = never.");
   }
   std::vector<std::string> validate() const { return {}; }
   /// The largest weight one observation adds to a cell, in integer units.
@@ -54,7 +66,8 @@ class TsdfGrid {
 
   /// @param half_size_m the window reaches at least this far from its centre (sizes round up to powers of
   /// two)
-  TsdfGrid(const TsdfConfig& config, double half_size_m);
+  /// @param vectors  false: plain code even where there is AVX2, for tests
+  TsdfGrid(const TsdfConfig& config, double half_size_m, bool vectors = true);
 
   /// Everything becomes unknown.
   void clear();
@@ -99,7 +112,16 @@ class TsdfGrid {
   /// one word per lower left cell: bits 0-7 (x, y), 8-15 (x + 1, y), 16-23 (x, y + 1), 24-31 (x + 1, y + 1).
   /// One random read gives all that bilinear interpolation needs.
   const std::uint32_t* quads() const { return quad_.data(); }
-  std::int8_t value(int ix, int iy) const { return static_cast<std::int8_t>(quad_[index(ix, iy)] & 0xFFu); }
+  std::size_t quad_index(int ix, int iy) const {
+    return static_cast<std::size_t>(iy & mask_) * static_cast<std::size_t>(quad_stride_) +
+           static_cast<std::size_t>(ix & mask_);
+  }
+  /// A row of quads is a cache line longer than a row of cells: rows a power of two apart would all fall into the same
+  /// set of the cache, and reading along a wall would miss it every time (3.7 instead of 1 ns a reading).
+  int quad_stride() const { return quad_stride_; }
+  std::int8_t value(int ix, int iy) const { return value_[index(ix, iy)]; }
+  /// What of weight_units() surfaces of low or high things gave.
+  std::int32_t standing_weight_units(int ix, int iy) const { return standing_weight_[index(ix, iy)]; }
   float weight_unit() const { return weight_unit_; }
   const std::int32_t* weighted_sums() const { return weighted_sum_.data(); }
   const std::int32_t* weights() const { return weight_.data(); }
@@ -110,18 +132,19 @@ class TsdfGrid {
   template <bool kAdd>
   void apply(const TsdfObservation& observation);
   template <bool kAdd>
-  void apply_row(const TsdfObservation& observation, int iy, int from_x, int to_x);
-  void set_value(int ix, int iy, std::int8_t value);
-  void refresh(int ix, int iy, std::size_t i);
+  TsdfChange apply_row(const TsdfObservation& observation, float cos_yaw, float sin_yaw, int iy, int from_x, int to_x);
+  void rebuild_quads(int iy, int from_x, int to_x);
   void reset_cell(int ix, int iy, std::uint32_t next_sequence);
 
   TsdfConfig config_;
-  int bits_ = 0, size_ = 0, mask_ = 0;
+  int bits_ = 0, size_ = 0, mask_ = 0, quad_stride_ = 0;
   int first_x_ = 0, first_y_ = 0;
   float weight_unit_ = 0.0f;
-  std::vector<std::int32_t> weighted_sum_, weight_;
+  TsdfRules rules_;
+  std::vector<std::int32_t> weighted_sum_, weight_, standing_weight_;
   std::vector<std::uint32_t> reset_;
   std::vector<float> last_seen_s_;
+  std::vector<std::int8_t> value_;
   std::vector<std::uint32_t> quad_;
   std::vector<std::uint8_t> contradictions_;
   std::vector<std::int32_t>

@@ -12,14 +12,17 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 void resize(std::size_t columns, TsdfObservation* out) {
   for (std::vector<float>* field :
        {&out->direction_x, &out->direction_y, &out->range_m, &out->truncation_m, &out->free_from_m,
-        &out->free_to_m, &out->clear_from_m, &out->clear_to_m}) {
+        &out->free_to_m, &out->clear_from_m, &out->clear_to_m, &out->inverse_truncation_per_m}) {
     field->resize(columns);
   }
+  out->standing.assign(columns, 0);
+  out->any_standing = false;
 }
 
 void set_truncation(const TruncationConfig& truncation, std::size_t i, TsdfObservation* out) {
   const float r = out->range_m[i];
   out->truncation_m[i] = std::isnan(r) ? 0.0f : truncation.at(r);
+  out->inverse_truncation_per_m[i] = std::isnan(r) ? 0.0f : 1.0f / out->truncation_m[i];
 }
 
 bool answered(const TsdfObservation& o, std::size_t i) {
@@ -92,7 +95,7 @@ void observation_from(const DepthProfile& profile, const ObservationLimits& limi
   const std::size_t n = profile.z_m.size();
   resize(n, out);
   out->stamp_s = profile.stamp_s;
-  out->behind_full = static_cast<float>(limits.truncation.behind_full);
+  out->behind_slope = 1.0f / (1.0f - static_cast<float>(limits.truncation.behind_full));
   out->behind_power = limits.truncation.behind_power;
   out->pinhole = true;
   out->fx_px = static_cast<float>(profile.fx_px);
@@ -109,6 +112,11 @@ void observation_from(const DepthProfile& profile, const ObservationLimits& limi
     out->range_m[i] =
         z >= low && z <= high ? z * stretch : kNaN;  // equation 3: the range along the ray, not z
     set_truncation(limits.truncation, i, out);
+    const HeightClass height = i < profile.height_class.size() ? profile.height_class[i] : HeightClass::kMiddle;
+    if (!std::isnan(out->range_m[i]) && (height == HeightClass::kLow || height == HeightClass::kHigh)) {
+      out->standing[i] = -1;
+      out->any_standing = true;
+    }
     const float from = profile.free_from_m[i], to = std::min(profile.free_to_m[i], high);
     const bool free = from >= 0.0f && to > from;
     out->free_from_m[i] = free ? from * stretch : 0.0f;
@@ -124,7 +132,7 @@ void observation_from(const RangeScan& scan, const ObservationLimits& limits, Ts
   const std::size_t n = scan.range_m.size();
   resize(n, out);
   out->stamp_s = scan.stamp_s;
-  out->behind_full = static_cast<float>(limits.truncation.behind_full);
+  out->behind_slope = 1.0f / (1.0f - static_cast<float>(limits.truncation.behind_full));
   out->behind_power = limits.truncation.behind_power;
   out->pinhole = false;
   out->angle_min_rad = static_cast<float>(scan.angle_min_rad);

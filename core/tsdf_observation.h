@@ -55,8 +55,12 @@ struct TsdfObservation {
   std::vector<float> direction_x, direction_y;  ///< unit vector of the ray in the sensor's frame
   std::vector<float> range_m;                   ///< NaN: no surface
   std::vector<float> truncation_m;              ///< mu(range)
-  float behind_full = 0.0f;                     ///< see TruncationConfig
+  std::vector<float> inverse_truncation_per_m;  ///< 1 / mu
+  float behind_slope = 1.0f;                    ///< 1 / (1 - behind_full), see TruncationConfig
   int behind_power = 0;
+  /// -1: the surface is a low or a high thing (HeightClass), which leaves the view as the robot drives up to it; 0: not.
+  std::vector<std::int32_t> standing;
+  bool any_standing = false;
   std::vector<float> free_from_m, free_to_m;  ///< carved between these; free_to < free_from: nothing
   /// Between these nothing stands within a margin on either side of the ray.
   std::vector<float> clear_from_m, clear_to_m;

@@ -8,6 +8,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "core/progress.h"
@@ -82,25 +83,23 @@ class Recorder {
 
 }  // namespace
 
-TourResult run_tour(Simulator& simulator, const TourScript& script, const RecordingOptions& options,
-                    rosbag::Bag* bag) {
+TourResult run_tour(Simulator& simulator, const TourScript& script, double odom_rate_hz, double limit_s,
+                    const TourObserver& observer) {
   TourResult result;
   TourDriver driver(script);
-  Recorder recorder(simulator, options, bag);
   Progress progress("simulate");
   FrameRequest request;
   const double start_s = simulator.stamp_s();
-  const auto every =
-      static_cast<int>(std::max(1L, std::lround(1.0 / (options.odom_rate_hz * simulator.config().step_s))));
+  const auto every = static_cast<int>(std::max(1L, std::lround(1.0 / (odom_rate_hz * simulator.config().step_s))));
   while (true) {
     const TourDriver::Command command = driver.step(simulator.stamp_s(), simulator.T_world_base());
-    recorder.odometry();
+    if (observer.odometry) observer.odometry();
     result.truth.push_back({simulator.stamp_s(), simulator.T_world_base()});
     result.odometry.push_back({simulator.stamp_s(), simulator.T_odom_base()});
-    if (command.done) break;
+    if (command.done || simulator.stamp_s() - start_s >= limit_s) break;
     if (command.mark) {
       result.marks.push_back(*command.mark);
-      recorder.mark();
+      if (observer.mark) observer.mark(*command.mark);
     }
     if (command.stuck) {
       const Pose2& at = simulator.T_world_base();
@@ -111,7 +110,7 @@ TourResult run_tour(Simulator& simulator, const TourScript& script, const Record
     simulator.set_command(command.v_mps, command.w_radps);
     for (int i = 0; i < every; ++i) {
       simulator.step();
-      if (simulator.next_frame(&request) && recorder.frame(request)) ++result.depth_frames;
+      if (simulator.next_frame(&request) && observer.frame && observer.frame(request)) ++result.depth_frames;
     }
     stop_if_interrupted();
     progress.update(driver.progress(), fmt::format("{:.0f} s, {:.1f} m", simulator.stamp_s() - start_s,
@@ -122,6 +121,16 @@ TourResult run_tour(Simulator& simulator, const TourScript& script, const Record
   result.distance_m = simulator.distance_driven_m();
   result.contacts = simulator.contacts();
   return result;
+}
+
+TourResult run_tour(Simulator& simulator, const TourScript& script, const RecordingOptions& options,
+                    rosbag::Bag* bag) {
+  Recorder recorder(simulator, options, bag);
+  TourObserver observer;
+  observer.odometry = [&] { recorder.odometry(); };
+  observer.mark = [&](const std::string&) { recorder.mark(); };
+  observer.frame = [&](const FrameRequest& request) { return recorder.frame(request); };
+  return run_tour(simulator, script, options.odom_rate_hz, std::numeric_limits<double>::infinity(), observer);
 }
 
 }  // namespace knav

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,18 @@ struct TourResult {
   ContactCount contacts;
   Trajectory truth, odometry;  ///< T_world_base, T_odom_base at the odometry's rate
 };
+
+/// What somebody who watches a tour is told, in the order of time. Empty ones are not called.
+struct TourObserver {
+  std::function<void()> odometry;                        ///< at odometry's rate
+  std::function<void(const std::string& name)> mark;     ///< the button was pressed
+  std::function<bool(const FrameRequest& request)> frame;  ///< a frame was read out; true if it counts as recorded
+};
+
+/// Drives a script through a world in lock-step, with a progress line. UserError if the robot gets stuck.
+/// @param limit_s  stops after so many simulated seconds
+TourResult run_tour(Simulator& simulator, const TourScript& script, double odom_rate_hz, double limit_s,
+                    const TourObserver& observer);
 
 /// Drives a script through a world in lock-step, with a progress line, and writes what happens to a bag
 /// (null: to none). UserError if the robot gets stuck.

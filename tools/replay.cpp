@@ -14,6 +14,7 @@
 #include "global_map_builder/observation_reader.h"
 #include "ros_common/command_line.h"
 #include "tools/local_map_picture.h"
+#include "tools/mapper_trajectory.h"
 #include "tsdf_local_mapper/local_mapper.h"
 
 namespace knav {
@@ -31,71 +32,26 @@ const char* const kJsonHelp =
 speed_ratio (recording_s / elapsed_s), epochs (count), path_m (length of the estimate), seed.)";
 
 
-/// Gathers what the mapper says of each frame. Across epochs the trajectory goes on by odometry.
-class Recorder {
- public:
-  explicit Recorder(const LocalMapperConfig& config) : mapper_(config) {}
-
-  void add_odometry(double stamp_s, const Pose2& T_odom_base) { mapper_.add_odometry(stamp_s, T_odom_base); }
-
-  template <class Observation>
-  void add(const Observation& observation, const Pose2& T_base_sensor) {
-    ++frames_;
-    const LocalMapperResult& result = mapper_.update(observation, T_base_sensor);
-    if (!result.accepted) return;
-    ++accepted_;
-    if (odometry_.empty()) {
-      epoch_ = result.epoch;
-      T_map_local_ = result.T_local_base.inverse();
-    } else if (result.epoch != epoch_) {
-      epoch_ = result.epoch;
-      ++epochs_;
-      const Pose2 T_map_base =
-          trajectory_.back().T_map_robot * (odometry_.back().T_map_robot.inverse() * result.T_odom_base);
-      T_map_local_ = T_map_base * result.T_local_base.inverse();
-    }
-    const Pose2 T_map_base = T_map_local_ * result.T_local_base;
-    if (!trajectory_.empty()) path_m_ += distance_m(trajectory_.back().T_map_robot, T_map_base);
-    trajectory_.push_back({result.stamp_s, T_map_base});
-    odometry_.push_back({result.stamp_s, result.T_odom_base});
-  }
-
-  const LocalMapper& mapper() const { return mapper_; }
-  const Trajectory& trajectory() const { return trajectory_; }
-  const Trajectory& odometry() const { return odometry_; }
-  int frames() const { return frames_; }
-  int accepted() const { return accepted_; }
-  int epochs() const { return epochs_; }
-  double path_m() const { return path_m_; }
-
- private:
-  LocalMapper mapper_;
-  Trajectory trajectory_, odometry_;
-  Pose2 T_map_local_;
-  std::uint32_t epoch_ = 0;
-  int frames_ = 0, accepted_ = 0, epochs_ = 1;
-  double path_m_ = 0.0;
-};
-
 void replay(const Options& options) {
   auto mapper_config = read_config_section<LocalMapperConfig>(options.config, "local_mapper");
   if (options.seed >= 0) mapper_config.seed = options.seed;
   ObservationReaderConfig reader_config;
   reader_config.source = options.from;
   ObservationReader reader(options.bag, reader_config, FrontEndConfig::from_file(options.config));
-  Recorder recorder(mapper_config);
+  LocalMapper mapper(mapper_config);
+  MapperTrajectory recorder;
   Progress progress("replay (" + reader.source() + ")");
 
   ObservationCallbacks callbacks;
-  callbacks.add_odometry = [&](double stamp_s, const Pose2& T) { recorder.add_odometry(stamp_s, T); };
+  callbacks.add_odometry = [&](double stamp_s, const Pose2& T) { mapper.add_odometry(stamp_s, T); };
   std::string profiles_csv;
   callbacks.profile = [&](const DepthProfile& profile, const Pose2& T) {
     if (!options.profiles.empty()) {
       profiles_csv += fmt::format("{:.6f},{:.4f}\n", profile.stamp_s, fmt::join(profile.z_m, ","));
     }
-    recorder.add(profile, T);
+    recorder.add(mapper.update(profile, T));
   };
-  callbacks.scan = [&](const RangeScan& scan, const Pose2& T) { recorder.add(scan, T); };
+  callbacks.scan = [&](const RangeScan& scan, const Pose2& T) { recorder.add(mapper.update(scan, T)); };
   callbacks.progress = [&](double fraction) {
     progress.update(fraction, fmt::format("{} frames, {:.1f} m", recorder.frames(), recorder.path_m()));
   };
@@ -104,13 +60,13 @@ void replay(const Options& options) {
   const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   progress.update(1.0);
   for (const std::string& warning : reader.warnings()) fmt::print(stderr, "replay: {}\n", warning);
-  if (recorder.trajectory().empty()) {
-    throw UserError(options.bag + ": no frame could be used: " + recorder.mapper().result().reason);
+  if (recorder.estimate().empty()) {
+    throw UserError(options.bag + ": no frame could be used: " + mapper.result().reason);
   }
 
-  write_trajectory(options.trajectory, options.odometry_only ? recorder.odometry() : recorder.trajectory());
+  write_trajectory(options.trajectory, options.odometry_only ? recorder.odometry() : recorder.estimate());
   if (!options.profiles.empty()) write_text_atomically(options.profiles, profiles_csv);
-  if (!options.map_out.empty()) write_local_map_pictures(options.map_out, recorder.mapper());
+  if (!options.map_out.empty()) write_local_map_pictures(options.map_out, mapper);
   const double recording_s = reader.statistics().last_stamp_s - reader.statistics().first_stamp_s;
   const nlohmann::json json = {{"source", reader.source()},
                                {"frames", recorder.frames()},

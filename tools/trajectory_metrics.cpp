@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -24,6 +25,7 @@ class Gatherer {
     result.count = static_cast<int>(translation_.size());
     moments(translation_, &result.translation_mean_m, &result.translation_sd_m);
     moments(rotation_, &result.rotation_mean_deg, &result.rotation_sd_deg);
+    for (const double v : translation_) result.translation_max_m = std::max(result.translation_max_m, v);
     return result;
   }
 

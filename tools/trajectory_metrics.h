@@ -24,6 +24,7 @@ struct ErrorStatistics {
   double translation_sd_m = 0.0;
   double rotation_mean_deg = 0.0;
   double rotation_sd_deg = 0.0;
+  double translation_max_m = 0.0;
 };
 
 /// Error over relations after Kuemmerle et al., "On Measuring the Accuracy of SLAM Algorithms" (2009): the

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/fast_math.h"
 #include "core/random.h"
 #include "core/tsdf_alignment.h"
 
@@ -80,14 +81,15 @@ void PoseFilter::jitter(const Pose2& center, const Eigen::Matrix3d& covariance, 
   // Shrinking towards the mean first keeps the spread as it is (Liu and West).
   const double keep = std::sqrt(std::max(0.0, 1.0 - width * width));
   for (std::size_t i = 0; i < particles_.size(); ++i) {
-    RandomStream random(seed_, random_stream::kMotion, step_, static_cast<std::uint32_t>(i));
-    const double a = random.normal(), b = random.normal(), c = random.normal();
-    const Eigen::Vector3d noise = root * Eigen::Vector3d(a, b, c);
+    double n[3];
+    three_normals(seed_, random_stream::kMotion, step_, static_cast<std::uint32_t>(i), n);
     const Pose2 p = particles_.pose(i);
-    const double yaw = normalize_angle_rad(p.yaw_rad - center.yaw_rad);
-    particles_.set(i, {center.x_m + keep * (p.x_m - center.x_m) + noise.x(),
-                       center.y_m + keep * (p.y_m - center.y_m) + noise.y(),
-                       normalize_angle_rad(center.yaw_rad + keep * yaw + noise.z())});
+    const double turn = p.yaw_rad - center.yaw_rad;
+    const double yaw = center.yaw_rad + keep * (turn - 2.0 * kPi * rounded(turn / (2.0 * kPi))) + root(2, 0) * n[0] +
+                       root(2, 1) * n[1] + root(2, 2) * n[2];
+    particles_.set(i, {center.x_m + keep * (p.x_m - center.x_m) + root(0, 0) * n[0],
+                       center.y_m + keep * (p.y_m - center.y_m) + root(1, 0) * n[0] + root(1, 1) * n[1],
+                       yaw - 2.0 * kPi * rounded(yaw / (2.0 * kPi))});
   }
   ++step_;
 }

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/tsdf_observation.h"
+
+namespace knav {
+
+/// The part of a row of cells that lies in one piece in memory; a pointer each to its first cell.
+struct TsdfCells {
+  std::int32_t* weighted_sum;
+  std::int32_t* weight;
+  std::int32_t* standing_weight;  ///< the share of `weight` that surfaces of low or high things gave
+  std::uint32_t* reset;
+  float* last_seen_s;
+  std::uint8_t* contradictions;
+  std::int8_t* value;
+};
+
+/// What integrating needs besides the observation.
+struct TsdfRules {
+  float weight_unit = 0.0f;
+  float weight_range_floor_m = 0.0f;
+  float resolution_m = 0.0f;
+  int contradictions_to_reset = 0;
+  float middle_clear_from_m = 0.0f;   ///< nearer than this even a middle thing is out of view
+  float standing_clear_to_m = 0.0f;   ///< beyond this a low thing is no longer seen
+  float front_clear_to_m = 0.0f;      ///< see TsdfConfig::front_clear_range_m
+  bool vectors = true;
+};
+
+/// Which cells changed their value: a range, or none.
+struct TsdfChange {
+  int first = 1 << 30, last = -(1 << 30);
+  bool empty() const { return first > last; }
+  void add(int k) {
+    if (k < first) first = k;
+    if (k > last) last = k;
+  }
+};
+
+/// Adds the observation to, or removes it from, cells [0, count) of a row (equations 2-6, 8, 9).
+/// @param column      the observation's column that sees cell k, or -1
+/// @param distance_m  of its centre from the sensor
+/// @param contradicted  receives how many cells were reset
+/// The same bytes with and without vectors.
+TsdfChange add_to_cells(const TsdfRules& rules, const TsdfObservation& observation, const std::int32_t* column,
+                        const float* distance_m, int count, const TsdfCells& cells, std::uint64_t* contradicted);
+TsdfChange remove_from_cells(const TsdfRules& rules, const TsdfObservation& observation, const std::int32_t* column,
+                             const float* distance_m, int count, const TsdfCells& cells);
+
+}  // namespace knav
