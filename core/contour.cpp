@@ -4,11 +4,21 @@
 #include <cmath>
 #include <limits>
 
+#include "core/fast_math.h"
+#include "core/free_blocks.h"
+
 namespace knav {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
+
+/// Lengths along a ray in 2^-32 cells: whole numbers, so that a jump over many edges arrives where single steps do.
+using Along = std::int64_t;
+constexpr double kAlongPerCell = 4294967296.0;
+constexpr Along kNever = Along{1} << 56;  ///< longer than any ray, and 32 of them still fit
+
+double cells_of(Along t) { return static_cast<double>(t) * (1.0 / kAlongPerCell); }
 
 /// Visits the cells on a ray in order (Amanatides and Woo). Quad (ix, iy) spans four cell centres, and the
 /// dual grid of these quads is walked, so that F is continuous along the ray and one word serves each step.
@@ -19,26 +29,57 @@ class QuadWalk {
     iy = static_cast<int>(std::floor(y));
     step_x_ = dir_x > 0.0 ? 1 : -1;
     step_y_ = dir_y > 0.0 ? 1 : -1;
-    const double huge = 1e30;
-    delta_x_ = std::fabs(dir_x) > 1e-12 ? 1.0 / std::fabs(dir_x) : huge;
-    delta_y_ = std::fabs(dir_y) > 1e-12 ? 1.0 / std::fabs(dir_y) : huge;
-    next_x_ = delta_x_ < huge ? (dir_x > 0.0 ? ix + 1 - x : x - ix) * delta_x_ : huge;
-    next_y_ = delta_y_ < huge ? (dir_y > 0.0 ? iy + 1 - y : y - iy) * delta_y_ : huge;
+    start(dir_x > 0.0 ? ix + 1 - x : x - ix, std::fabs(dir_x), &next_x_, &delta_x_);
+    start(dir_y > 0.0 ? iy + 1 - y : y - iy, std::fabs(dir_y), &next_y_, &delta_y_);
   }
-  double leaves_at() const { return std::min(next_x_, next_y_); }
+  Along leaves_at() const { return std::min(next_x_, next_y_); }
   void step() {
     // Without a branch: which way comes next is a coin toss, and a wrong guess costs more than both sums.
     const bool along_x = next_x_ < next_y_;
     ix += along_x ? step_x_ : 0;
     iy += along_x ? 0 : step_y_;
-    next_x_ += along_x ? delta_x_ : 0.0;
-    next_y_ += along_x ? 0.0 : delta_y_;
+    next_x_ += along_x ? delta_x_ : 0;
+    next_y_ += along_x ? 0 : delta_y_;
+  }
+
+  /// As many steps as leave the block of 2^shift quads a side, unless that is farther than `limit`.
+  /// @param left_at   where it was left
+  /// @param last_ix, last_iy  the last quad before that
+  bool leave_block(int shift, Along limit, Along* left_at, int* last_ix, int* last_iy) {
+    const int inside = (1 << shift) - 1;
+    int x = step_x_ > 0 ? inside - (ix & inside) : ix & inside;  // edges to cross before the last one
+    int y = step_y_ > 0 ? inside - (iy & inside) : iy & inside;
+    const Along out_x = next_x_ + x * delta_x_, out_y = next_y_ + y * delta_y_;
+    const bool along_x = out_x < out_y;
+    const Along out = along_x ? out_x : out_y;
+    if (out >= limit) return false;
+    // The other way's edges before `out`; those of a tie come first along y, as in step().
+    if (along_x) {
+      y = out >= next_y_ ? static_cast<int>((out - next_y_) / delta_y_) + 1 : 0;
+    } else {
+      x = out > next_x_ ? static_cast<int>((out - 1 - next_x_) / delta_x_) + 1 : 0;
+    }
+    ix += x * step_x_;
+    iy += y * step_y_;
+    next_x_ += x * delta_x_;
+    next_y_ += y * delta_y_;
+    *left_at = out;
+    *last_ix = ix;
+    *last_iy = iy;
+    step();
+    return true;
   }
   int ix, iy;
 
  private:
+  static void start(double to_edge, double speed, Along* next, Along* delta) {
+    const bool moves = speed * static_cast<double>(kNever) > kAlongPerCell;
+    *delta = moves ? static_cast<Along>(kAlongPerCell / speed) : kNever;
+    *next = moves ? static_cast<Along>(to_edge * static_cast<double>(*delta)) : kNever;
+  }
+
   int step_x_, step_y_;
-  double delta_x_, delta_y_, next_x_, next_y_;
+  Along delta_x_, delta_y_, next_x_, next_y_;
 };
 
 /// F * 127 at a point of a quad between its known corners; NaN if none is known.
@@ -66,22 +107,21 @@ float newest_seen(const TsdfGrid& grid, int ix, int iy) {
   return seen;
 }
 
-}  // namespace
-
-RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, double y_m, double dir_x,
-                double dir_y, double length_m) {
+RayEnd cast(const TsdfGrid& grid, const ContourConfig& config, const FreeBlocks* blocks, double x_m, double y_m,
+            double dir_x, double dir_y, double length_m) {
   const double scale = 1.0 / grid.resolution_m();
   const double x = x_m * scale - 0.5, y = y_m * scale - 0.5;  // quad corners (cell centres) at integers
-  const double length = length_m * scale;
-  const double blind = config.blind_radius_m * scale, gap = config.unknown_gap_m * scale;
+  const auto along = [scale](double metres) { return static_cast<Along>(metres * scale * kAlongPerCell); };
+  const Along length = along(length_m), blind = along(config.blind_radius_m), gap = along(config.unknown_gap_m);
   const std::uint32_t* const quads = grid.quads();
   QuadWalk walk(x, y, dir_x, dir_y);
-  double entered = 0.0;       // where the ray entered the present quad
-  double unknown_from = 0.0;  // where the present stretch of unknown began
-  double positive_at = -1.0;  // the last place where F was known and positive, without unknown since
+  Along entered = 0;       // where the ray entered the present quad
+  Along unknown_from = 0;  // where the present stretch of unknown began
+  Along positive_at = -1;  // the last place where F was known and positive, without unknown since
   int positive_ix = 0, positive_iy = 0;  // its quad; the value there is only worked out at a crossing
   RayEnd end;
-  const auto value_at = [&](int ix, int iy, double t) {
+  const auto value_at = [&](int ix, int iy, Along at) {
+    const double t = cells_of(at);
     return value_in(quads[grid.quad_index(ix, iy)], static_cast<float>(x + t * dir_x - ix),
                     static_cast<float>(y + t * dir_y - iy));
   };
@@ -91,7 +131,22 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
     if (static_cast<unsigned>(walk.ix - first_x) >= inside ||
         static_cast<unsigned>(walk.iy - first_y) >= inside)
       break;
-    const double leaves = std::min(walk.leaves_at(), length);
+    if (blocks && blocks->free(0, walk.ix, walk.iy)) {
+      const int level = blocks->free(1, walk.ix, walk.iy) ? 1 : 0;
+      if (walk.leave_block(FreeBlocks::kShift[level], length, &entered, &positive_ix, &positive_iy)) {
+        positive_at = unknown_from = entered;
+        continue;
+      }
+    } else if (blocks && blocks->unknown(walk.ix, walk.iy)) {
+      // Only where the stretch of unknown may not end the ray.
+      int ix, iy;
+      if (walk.leave_block(FreeBlocks::kShift[0], std::min(length, std::max(unknown_from, blind) + gap), &entered, &ix,
+                           &iy)) {
+        positive_at = -1;
+        continue;
+      }
+    }
+    const Along leaves = std::min(walk.leaves_at(), length);
     const std::uint32_t quad = quads[grid.quad_index(walk.ix, walk.iy)];
     if ((quad & kSigns) == 0 && quad != 0) {  // all corners known and none negative
       positive_at = leaves;
@@ -99,34 +154,34 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
       positive_iy = walk.iy;
       unknown_from = leaves;
     } else if (quad == kAllUnknown) {
-      positive_at = -1.0;  // positive next to unknown is no surface
+      positive_at = -1;  // positive next to unknown is no surface
       if (leaves - std::max(unknown_from, blind) > gap) break;
     } else {
       // The middle and the far edge of the ray's way through the quad.
-      for (const double t : {0.5 * (entered + leaves), leaves}) {
+      for (const Along t : {entered + (leaves - entered) / 2, leaves}) {
         const float value = value_at(walk.ix, walk.iy, t);
         if (value > 0.0f) {
           positive_at = t;
           positive_ix = walk.ix;
           positive_iy = walk.iy;
         } else {
-          if (positive_at >= 0.0) {
+          if (positive_at >= 0) {
             const float before = value_at(positive_ix, positive_iy, positive_at);
             const double share = before > value ? static_cast<double>(-value / (before - value)) : 0.0;
-            const double back = (t - positive_at) * share;
+            const double back = cells_of(t - positive_at) * share;
             end.kind = RayEnd::Kind::kSurface;
-            end.range_m = static_cast<float>((t - back) * grid.resolution_m());
+            end.range_m = static_cast<float>((cells_of(t) - back) * grid.resolution_m());
             end.last_seen_s = newest_seen(grid, walk.ix, walk.iy);
             return end;
           }
-          positive_at = -1.0;  // behind a surface that the ray did not cross from its front
+          positive_at = -1;  // behind a surface that the ray did not cross from its front
         }
       }
       unknown_from = leaves;
     }
     entered = leaves;
     if (entered >= length) {
-      if (positive_at >= 0.0) {
+      if (positive_at >= 0) {
         end.kind = RayEnd::Kind::kFree;
         end.last_seen_s = grid.last_seen_s(walk.ix, walk.iy);
       }
@@ -134,8 +189,15 @@ RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, d
     }
     walk.step();
   }
-  end.range_m = static_cast<float>(entered * grid.resolution_m());
+  end.range_m = static_cast<float>(cells_of(entered) * grid.resolution_m());
   return end;
+}
+
+}  // namespace
+
+RayEnd cast_ray(const TsdfGrid& grid, const ContourConfig& config, double x_m, double y_m, double dir_x,
+                double dir_y, double length_m) {
+  return cast(grid, config, nullptr, x_m, y_m, dir_x, dir_y, length_m);
 }
 
 void extract_contour(const TsdfGrid& grid, const ContourConfig& config, const Pose2& T, float now_age_clock_s,
@@ -147,10 +209,16 @@ void extract_contour(const TsdfGrid& grid, const ContourConfig& config, const Po
   scan->range_max_m = config.range_max_m;
   scan->range_m.resize(rays);
   scan->evidence.resize(rays);
+  static thread_local FreeBlocks blocks;
+  static thread_local std::vector<double> angle, cosine, sine;
+  blocks.build(grid, T.x_m, T.y_m, config.range_max_m);
+  for (std::vector<double>* field : {&angle, &cosine, &sine}) field->resize(rays);
   for (std::size_t i = 0; i < rays; ++i) {
-    const double angle = T.yaw_rad + scan->angle_min_rad + static_cast<double>(i) * scan->angle_increment_rad;
-    const RayEnd end =
-        cast_ray(grid, config, T.x_m, T.y_m, std::cos(angle), std::sin(angle), config.range_max_m);
+    angle[i] = T.yaw_rad + scan->angle_min_rad + static_cast<double>(i) * scan->angle_increment_rad;
+  }
+  cos_sin(angle.data(), rays, cosine.data(), sine.data());
+  for (std::size_t i = 0; i < rays; ++i) {
+    const RayEnd end = cast(grid, config, &blocks, T.x_m, T.y_m, cosine[i], sine[i], config.range_max_m);
     const bool unknown = end.kind == RayEnd::Kind::kUnknown;
     scan->range_m[i] = unknown ? kNaN : end.kind == RayEnd::Kind::kFree ? kInf : end.range_m;
     const float age_s = std::max(0.0f, now_age_clock_s - end.last_seen_s);
