@@ -175,19 +175,20 @@ void tsdf_alignment_costs(const TsdfGrid& grid, const WeightedPoints& points, co
 void weigh_by_known_share(const TsdfGrid& grid, const ParticleSet& particles, int hypotheses,
                           WeightedPoints* points) {
   const std::size_t count = std::min(particles.size(), static_cast<std::size_t>(std::max(1, hypotheses)));
-  std::fill(points->weight.begin(), points->weight.end(), 0.0f);
+  static thread_local std::vector<float> seen;
+  seen.assign(points->size(), 0.0f);
   for (std::size_t h = 0; h < count; ++h) {
     const Pose2 T = particles.pose(h * particles.size() / count);
     const double c = std::cos(T.yaw_rad), s = std::sin(T.yaw_rad);
     for (std::size_t k = 0; k < points->size(); ++k) {
       const double x = points->x_m[k], y = points->y_m[k];
       const int ix = grid.cell_of(T.x_m + c * x - s * y), iy = grid.cell_of(T.y_m + s * x + c * y);
-      if (grid.contains(ix, iy) && grid.known(ix, iy)) points->weight[k] += 1.0f;
+      if (grid.contains(ix, iy) && grid.known(ix, iy)) seen[k] += 1.0f;
     }
   }
-  for (float& w : points->weight) {
-    const float share = w / static_cast<float>(count);
-    w = share * share;
+  for (std::size_t k = 0; k < points->size(); ++k) {
+    const float share = seen[k] / static_cast<float>(count);
+    points->weight[k] *= share * share;
   }
 }
 

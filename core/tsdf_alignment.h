@@ -16,7 +16,7 @@ namespace knav {
 void tsdf_alignment_costs(const TsdfGrid& grid, const WeightedPoints& points_robot, const ParticleSet& particles,
                           float unknown_price, std::vector<float>* cost, bool vectors = true);
 
-/// Weighs each reading by how many of the hypotheses see it in known cells. What comes newly into view as the
+/// Multiplies each reading's weight by (the square of) how many of the hypotheses see it in known cells. What comes newly into view as the
 /// robot turns lies in unknown cells whatever the pose; charged the price there, it would hold the turn back.
 /// @param hypotheses  how many of the particles are asked, evenly spread
 void weigh_by_known_share(const TsdfGrid& grid, const ParticleSet& particles, int hypotheses,

@@ -110,6 +110,8 @@ MapperAccuracy measure_mapper(const ProfileRecording& recording, const LocalMapp
     accuracy.odometry_segment[k] = segment_error(trajectory.odometry(), truth, MapperAccuracy::kLengths_m[k]);
   }
   accuracy.lost = accuracy.segment[0].translation_max_m > kLost_m;
+  accuracy.estimate = trajectory.estimate();
+  accuracy.odometry = trajectory.odometry();
   accuracy.epochs = trajectory.epochs();
   accuracy.path_m = trajectory.path_m();
   if (recording.frames() > 0) accuracy.duration_s = recording.stamp_s(recording.frames() - 1) - recording.stamp_s(0);

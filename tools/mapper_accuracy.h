@@ -31,6 +31,7 @@ struct MapperAccuracy {
   double path_m = 0.0, duration_s = 0.0, elapsed_s = 0.0;
   std::vector<double> lifespan_s;       ///< of the generations of particles
   ScanAccuracy scan;
+  Trajectory estimate, odometry;
 };
 
 /// Maps a recorded drive and compares with the truth.

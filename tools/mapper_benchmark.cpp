@@ -33,7 +33,7 @@ worst_to_mean_20_m. lost: some 20 m segment is more than 2 m off. scan: rays wit
 8 m; a false obstacle is a return 0.3 m and 5 % nearer than anything within 0.1 m beside its ray.)";
 
 struct Options {
-  std::string worlds = "config/worlds", cache, config, json;
+  std::string worlds = "config/worlds", cache, config, json, trajectories;
   std::vector<std::string> rows = {"calibrated", "harsh", "paper", "people"};
   int seeds = 10, first_seed = 1, mapper_seed = -1;
   bool quick = false, fresh = false, record_only = false, no_scans = false;
@@ -184,6 +184,12 @@ void benchmark(const Options& options) {
       const MapperAccuracy accuracy = measure_mapper(recording, config, !options.no_scans);
       stop_if_interrupted();
       scan.add(accuracy.scan);
+      if (!options.trajectories.empty()) {
+        const std::string path = fmt::format("{}/{}-{}", options.trajectories, name, seed);
+        write_trajectory(path + ".tum", accuracy.estimate);
+        write_trajectory(path + ".odometry.tum", accuracy.odometry);
+        write_trajectory(path + ".truth.tum", recording.truth);
+      }
       nlohmann::json run = run_json(seed, accuracy);
       print_line(name, std::to_string(seed), run, NAN);
       runs.push_back(std::move(run));
@@ -223,6 +229,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--cache", options.cache, "Folder of the simulated drives")->capture_default_str();
   app.add_option("--json", options.json, "Write all figures here ('-' for standard output)");
+  app.add_option("--trajectories", options.trajectories,
+                 "Write ROW-SEED.tum, .odometry.tum and .truth.tum into this existing folder");
   app.add_flag("--quick", options.quick, "One seed and the first 75 s of the drive; under 3 minutes");
   app.add_flag("--fresh", options.fresh, "Simulate again what is in the cache (after a change of the simulator)");
   app.add_flag("--record-only", options.record_only, "Fill the cache only; several such processes may share it");

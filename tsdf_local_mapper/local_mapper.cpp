@@ -93,6 +93,8 @@ struct LocalMapper::State {
   void forget_pose();
   void note_motion(double stamp_s);
   void select_points(const TsdfObservation& observation, const Pose2& T_base_sensor);
+  float weight_of(const TsdfObservation& observation, float range_m) const;
+  double evidence_of(const Pose2& T_step) const;
   void align(const Pose2& T_step, const Pose2& T_base_sensor, double dt_s);
   void integrate(const Pose2& T_base_sensor);
   void learn_odometry();
@@ -192,6 +194,20 @@ void LocalMapper::State::note_motion(double stamp_s) {
   parked = stamp_s - moved_stamp_s > kParkedAfter_s;
 }
 
+float LocalMapper::State::weight_of(const TsdfObservation& o, float range_m) const {
+  if (!o.pinhole || config.filter.depth_trust_m <= 0.0) return 1.0f;
+  const float ratio = range_m / static_cast<float>(config.filter.depth_trust_m);
+  return 1.0f / (1.0f + ratio * ratio);
+}
+
+/// How much of a frame is new after a step.
+double LocalMapper::State::evidence_of(const Pose2& T_step) const {
+  if (config.filter.fresh_after_m <= 0.0) return 1.0;
+  const double share = std::hypot(T_step.x_m, T_step.y_m) / config.filter.fresh_after_m +
+                       std::fabs(T_step.yaw_rad) / config.filter.fresh_after_rad;
+  return std::clamp(share, 0.02, 1.0);
+}
+
 /// The readings that the filter compares: at most config.filter.readings, evenly over the valid columns.
 void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_base_sensor) {
   points.clear();
@@ -206,7 +222,7 @@ void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_
     next += stride;
     const double x = o.direction_x[i] * o.range_m[i], y = o.direction_y[i] * o.range_m[i];
     points.add(static_cast<float>(T_base_sensor.x_m + c * x - s * y),
-               static_cast<float>(T_base_sensor.y_m + s * x + c * y), 1.0f);
+               static_cast<float>(T_base_sensor.y_m + s * x + c * y), weight_of(o, o.range_m[i]));
   }
 }
 
@@ -232,7 +248,7 @@ void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, 
   } else {
     filter.predict(learner.corrected(T_step));
     if (readings) {
-      filter.update(grid, &points, result.stamp_s);
+      filter.update(grid, &points, result.stamp_s, evidence_of(T_step));
     } else {
       filter.estimate_from_particles();
     }

@@ -94,7 +94,7 @@ void PoseFilter::jitter(const Pose2& center, const Eigen::Matrix3d& covariance, 
   ++step_;
 }
 
-void PoseFilter::update(const TsdfGrid& grid, WeightedPoints* readings, double stamp_s) {
+void PoseFilter::update(const TsdfGrid& grid, WeightedPoints* readings, double stamp_s, double evidence) {
   if (config_.alignment_cost == "normalized") weigh_by_known_share(grid, particles_, kHypotheses, readings);
   const WeightedPoints& points = *readings;
   // Annealing: the likelihood enters in shares that sum to 1, the last and largest on the finest samples.
@@ -107,7 +107,7 @@ void PoseFilter::update(const TsdfGrid& grid, WeightedPoints* readings, double s
       resample();
       jitter(estimate.mean, estimate.covariance, 0.5);
     }
-    weigh(grid, points, share);
+    weigh(grid, points, share * evidence);
     estimate = weighted_mean(particles_);
   }
   mean_ = estimate.mean;

@@ -23,7 +23,8 @@ class PoseFilter {
   void predict(const Pose2& T_before_after);
   /// Weighs the particles by how well the readings fit, refines them, and leaves the estimate in mean() etc.
   /// Sets the readings' weights.
-  void update(const TsdfGrid& grid, WeightedPoints* points_robot, double stamp_s);
+  /// @param evidence  in (0, 1], how much of the frame is new
+  void update(const TsdfGrid& grid, WeightedPoints* points_robot, double stamp_s, double evidence = 1.0);
   /// The estimate without a measurement.
   void estimate_from_particles();
   /// Moves all particles and the estimate rigidly, without noise.

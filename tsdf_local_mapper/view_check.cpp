@@ -28,7 +28,8 @@ void ViewCheck::update(const TsdfGrid& grid, const TsdfObservation& o, const Pos
   }
   agree_ = known > 0 ? static_cast<double>(agree) / known : 0.0;
   through_ = known > 0 ? static_cast<double>(through) / known : 0.0;
-  suspicious_ = known >= kFewestKnown && through_ >= config_.carried_see_through_fraction;
+  suspicious_ = known >= kFewestKnown && through_ >= config_.carried_see_through_fraction &&
+                agree_ < config_.carried_agree_fraction;
   // Leaky, so that a good frame between bad ones does not start the count again.
   suspicious_s_ = suspicious_ ? suspicious_s_ + dt_s : std::max(0.0, suspicious_s_ - 2.0 * dt_s);
 }

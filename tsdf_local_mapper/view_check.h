@@ -6,7 +6,8 @@
 namespace knav {
 
 /// Compares a frame with what the map shows from the estimated pose. People and moved things stand in front
-/// of the map's surfaces; only a robot that is elsewhere than it believes looks through most of them.
+/// of the map's surfaces; only a robot that is elsewhere than it believes looks through most of them. When somebody who
+/// stood close before the camera leaves, it looks through him, but what it sees beside him still meets the map.
 class ViewCheck {
  public:
   ViewCheck(const ContinuityConfig& config, const ContourConfig& contour, double range_max_m)

@@ -7,6 +7,8 @@
 #include <limits>
 
 #include "core/contour.h"
+#include "core/fast_math.h"
+#include "core/random.h"
 
 namespace knav {
 namespace {
@@ -208,6 +210,60 @@ TEST_F(ContourTest, NewestProfileReplacesItsSection) {
       EXPECT_EQ(scan.evidence[i], before.evidence[i]) << a;
     }
   }
+}
+
+TEST(Contour, CrossingFreeBlocksAtOnceFindsWhatSingleStepsFind) {
+  // A cluttered map, looked at from many places, half of them with the window scrolled so that the torus' seam lies in
+  // view: every ray as cast_ray() finds it cell by cell.
+  TsdfConfig config;
+  TsdfGrid grid(config, 12.0);
+  RandomStream random(5, random_stream::kTest, 9, 0);
+  std::uint32_t sequence = 0;
+  int surfaces = 0, free = 0, unknown = 0;
+  for (int place = 0; place < 12; ++place) {
+    const Pose2 robot{0.9 * place, -0.5 * place, random.uniform(-kPi, kPi)};
+    grid.scroll_to(robot.x_m, robot.y_m, sequence + 1);
+    for (int k = 0; k < 3; ++k) {
+      RangeScan scan;
+      scan.angle_min_rad = random.uniform(-kPi, 0.0);
+      scan.angle_increment_rad = 0.01;
+      scan.range_max_m = 30.0;
+      for (int i = 0; i < 200; ++i) {
+        const bool hole = random.uniform() < 0.02;
+        scan.range_m.push_back(hole ? std::numeric_limits<float>::quiet_NaN()
+                                    : static_cast<float>(5.0 + 3.0 * std::sin(0.05 * i) + random.uniform(-0.05, 0.05)));
+      }
+      TsdfObservation o;
+      observation_from(scan, ObservationLimits{}, &o);
+      o.sequence = ++sequence;
+      o.T_map_sensor = robot;
+      grid.add(o);
+    }
+    ContourConfig contour;
+    contour.rays = 720;
+    contour.range_max_m = place % 2 == 0 ? 4.0 : 11.0;
+    RangeScan scan;
+    extract_contour(grid, contour, robot, 0.0f, &scan);
+    for (std::size_t i = 0; i < 720; ++i) {
+      const double angle = robot.yaw_rad + scan.angle_min_rad + static_cast<double>(i) * scan.angle_increment_rad;
+      double cosine, sine;
+      cos_sin(&angle, 1, &cosine, &sine);
+      const RayEnd end = cast_ray(grid, contour, robot.x_m, robot.y_m, cosine, sine, contour.range_max_m);
+      if (end.kind == RayEnd::Kind::kSurface) {
+        ++surfaces;
+        ASSERT_EQ(scan.range_m[i], end.range_m);
+      } else if (end.kind == RayEnd::Kind::kFree) {
+        ++free;
+        ASSERT_TRUE(std::isinf(scan.range_m[i]));
+      } else {
+        ++unknown;
+        ASSERT_TRUE(std::isnan(scan.range_m[i]));
+      }
+    }
+  }
+  EXPECT_GT(surfaces, 500);
+  EXPECT_GT(free, 500);
+  EXPECT_GT(unknown, 500);
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
+#include "core/fast_math.h"
 #include "core/random.h"
 
 namespace knav {
@@ -44,6 +46,42 @@ TEST(RandomStream, NormalHasUnitMoments) {
   }
   EXPECT_NEAR(sum / n, 0.0, 0.016);
   EXPECT_NEAR(squares / n, 1.0, 0.023);
+}
+
+TEST(FastMath, CosineAndSineAgreeWithTheLibrary) {
+  std::vector<double> angle, cosine(4001), sine(4001);
+  for (int i = -2000; i <= 2000; ++i) angle.push_back(0.013 * i);
+  cos_sin(angle.data(), angle.size(), cosine.data(), sine.data());
+  for (std::size_t i = 0; i < angle.size(); ++i) {
+    ASSERT_NEAR(cosine[i], std::cos(angle[i]), 1e-11) << angle[i];
+    ASSERT_NEAR(sine[i], std::sin(angle[i]), 1e-11) << angle[i];
+  }
+}
+
+TEST(FastMath, NormalNumbersHaveTheNormalDistribution) {
+  // The quantiles of a table of the normal distribution.
+  EXPECT_NEAR(normal_from_bits(0x80000000u), 0.0, 1e-9);
+  EXPECT_NEAR(normal_from_bits(static_cast<std::uint32_t>(0.841344746 * 4294967296.0)), 1.0, 1e-3);
+  EXPECT_NEAR(normal_from_bits(static_cast<std::uint32_t>(0.022750132 * 4294967296.0)), -2.0, 1e-3);
+  EXPECT_NEAR(normal_from_bits(static_cast<std::uint32_t>(0.998650102 * 4294967296.0)), 3.0, 1e-6);
+  EXPECT_NEAR(normal_from_bits(0), -6.34, 0.02);  // the probability 2^-33
+  EXPECT_EQ(normal_from_bits(0), -normal_from_bits(0xFFFFFFFFu));
+  double sum = 0.0, square = 0.0, fourth = 0.0;
+  constexpr std::uint32_t kCount = 200000;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    double n[3];
+    three_normals(3, random_stream::kTest, 1, i, n);
+    for (const double z : n) {
+      sum += z;
+      square += z * z;
+      fourth += z * z * z * z;
+    }
+  }
+  // Four standard deviations of the sample's moments.
+  constexpr double kNumbers = 3.0 * kCount;
+  EXPECT_NEAR(sum / kNumbers, 0.0, 4 / std::sqrt(kNumbers));
+  EXPECT_NEAR(square / kNumbers, 1.0, 4 * std::sqrt(2 / kNumbers));
+  EXPECT_NEAR(fourth / kNumbers, 3.0, 4 * std::sqrt(96 / kNumbers));
 }
 
 }  // namespace

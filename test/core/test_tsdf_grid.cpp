@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <string>
+#include <tuple>
 #include <vector>
 
 #include "core/random.h"
@@ -182,6 +184,141 @@ TEST(TsdfGrid, ContradictedSurfaceIsGoneAtOnceAndAWallBesideItStays) {
   EXPECT_NEAR(grid.distance(80, -20), wall, 1e-3);
 }
 
+/// Ten columns' width of camera that sees a thing 0.9 m ahead, then only the wall at 3 m behind; the floor from 1.3 m on.
+class BlindZone : public ::testing::Test {
+ protected:
+  void add(float z_m, HeightClass height, int frames) {
+    for (int k = 0; k < frames; ++k) {
+      DepthProfile profile = profile_of(std::vector<float>(101, z_m), 100.0);
+      profile.height_class.assign(101, height);
+      if (z_m > 1.3f) {
+        profile.free_from_m.assign(101, 1.3f);
+        profile.free_to_m.assign(101, z_m - 0.1f);
+      }
+      TsdfObservation o;
+      observation_from(profile, limits_of(config_), &o);
+      o.sequence = ++sequence_;
+      o.T_map_sensor = {0.025, 0.025, 0.0};
+      grid_.add(o);
+      held_.push_back(o);
+    }
+  }
+  TsdfConfig config_ = fixed_truncation(0.3);
+  TsdfGrid grid_{config_, 6.0};
+  std::uint32_t sequence_ = 0;
+  std::vector<TsdfObservation> held_;
+};
+
+TEST_F(BlindZone, APersonWhoLeftIsGoneAfterFourFrames) {
+  add(0.9f, HeightClass::kMiddle, 1800);  // a minute; cell 18 is 0.9 m ahead
+  ASSERT_TRUE(grid_.known(18, 0));
+  ASSERT_LT(grid_.distance(20, 0), 0.0f);
+  add(3.0f, HeightClass::kMiddle, 3);
+  EXPECT_TRUE(grid_.known(20, 0));  // three frames may be a glitch
+  add(3.0f, HeightClass::kMiddle, 1);
+  EXPECT_FALSE(grid_.known(18, 0));  // nearer than the floor is seen: not free, but no surface either
+  EXPECT_FALSE(grid_.known(20, 0));
+  // And it stays gone when the minute leaves the window: what was reset is not taken away twice.
+  for (const TsdfObservation& o : held_) grid_.remove(o);
+  EXPECT_FALSE(grid_.known(18, 0));
+  EXPECT_EQ(grid_.weight_units(20, 0), 0);
+  EXPECT_EQ(grid_.standing_weight_units(20, 0), 0);
+}
+
+TEST_F(BlindZone, ALowOrAHighThingStays) {
+  for (const HeightClass height : {HeightClass::kLow, HeightClass::kHigh}) {
+    grid_.clear();
+    add(0.9f, height, 10);
+    const float before = grid_.distance(20, 0);
+    ASSERT_LT(before, 0.0f);
+    add(3.0f, HeightClass::kMiddle, 300);
+    EXPECT_FLOAT_EQ(grid_.distance(20, 0), before);
+  }
+}
+
+TEST_F(BlindZone, AMiddleThingNearerThanAnyViewStays) {
+  add(0.55f, HeightClass::kMiddle, 10);  // middle_clear_from_m = 0.6: cell 11 is 0.55 m ahead
+  const float before = grid_.distance(11, 0);
+  add(3.0f, HeightClass::kMiddle, 300);
+  EXPECT_FLOAT_EQ(grid_.distance(11, 0), before);
+}
+
+TEST_F(BlindZone, WhoStoodCloseBeforeAWallIsGoneToo) {
+  // 0.25 m before the wall at 2 m, within its truncation of 0.3 m: never carved, but F there is 0.25 / 0.3 = 0.83 where
+  // the person's was 0.
+  add(1.75f, HeightClass::kMiddle, 1800);
+  ASSERT_LT(grid_.distance(37, 0), 0.0f);  // 1.85 m
+  add(2.0f, HeightClass::kMiddle, 4);
+  EXPECT_NEAR(grid_.distance(35, 0), 0.25 / 0.3, 0.02);  // 1.75 m, only the new frames
+}
+
+TEST(TsdfGrid, PlainAndVectorCodeGiveTheSameBytes) {
+  TsdfConfig config;  // the defaults: weights that fall off behind surfaces
+  TsdfGrid plain(config, 3.2, false), vectors(config, 3.2, true);
+  RandomStream random(11, random_stream::kTest, 3, 0);
+  std::vector<TsdfObservation> held;
+  double x = 0.0, y = 0.0;
+  for (std::uint32_t sequence = 1; sequence <= 600; ++sequence) {
+    x = std::fmod(x + random.uniform(-0.15, 0.2), 4.0);
+    y = std::fmod(y + random.uniform(-0.15, 0.2), 4.0);
+    const bool wild = random.uniform() < 0.3;
+    const double wall_m = random.uniform(0.5, 5.0);
+    DepthProfile profile = profile_of(std::vector<float>(57), 45.0);
+    for (std::size_t i = 0; i < 57; ++i) {
+      profile.z_m[i] = random.uniform() < 0.05 ? kNaN : static_cast<float>(wild ? random.uniform(0.3, 5.0) : wall_m);
+      profile.free_from_m[i] = 0.8f;
+      profile.free_to_m[i] = static_cast<float>(wall_m);
+      profile.height_class[i] = random.uniform() < 0.2 ? HeightClass::kLow : HeightClass::kMiddle;
+    }
+    TsdfObservation o;
+    observation_from(profile, limits_of(config), &o);
+    o.sequence = sequence;
+    o.T_map_sensor = {x, y, random.uniform(-kPi, kPi)};
+    for (TsdfGrid* grid : {&plain, &vectors}) {
+      grid->scroll_to(x, y, sequence);
+      grid->add(o);
+    }
+    held.push_back(o);
+    if (held.size() > 20) {
+      const auto victim = held.begin() + static_cast<std::ptrdiff_t>(random.uniform() * 20);
+      for (TsdfGrid* grid : {&plain, &vectors}) grid->remove(*victim);
+      held.erase(victim);
+    }
+  }
+  EXPECT_GT(plain.cells_reset_by_contradiction(), 100u);
+  EXPECT_EQ(plain.cells_reset_by_contradiction(), vectors.cells_reset_by_contradiction());
+  int different = 0, standing = 0;
+  for (int iy = plain.first_y(); iy < plain.first_y() + plain.size_cells() - 1; ++iy) {
+    for (int ix = plain.first_x(); ix < plain.first_x() + plain.size_cells() - 1; ++ix) {
+      different += plain.weighted_sum_units(ix, iy) != vectors.weighted_sum_units(ix, iy) ||
+                           plain.weight_units(ix, iy) != vectors.weight_units(ix, iy) ||
+                           plain.standing_weight_units(ix, iy) != vectors.standing_weight_units(ix, iy) ||
+                           plain.reset_sequence(ix, iy) != vectors.reset_sequence(ix, iy) ||
+                           plain.last_seen_s(ix, iy) != vectors.last_seen_s(ix, iy) ||
+                           plain.value(ix, iy) != vectors.value(ix, iy) ||
+                           plain.quads()[plain.quad_index(ix, iy)] != vectors.quads()[vectors.quad_index(ix, iy)]
+                       ? 1
+                       : 0;
+      standing += plain.standing_weight_units(ix, iy) > 0 ? 1 : 0;
+      // The quad is its four cells.
+      const std::uint32_t quad = plain.quads()[plain.quad_index(ix, iy)];
+      ASSERT_EQ(static_cast<std::int8_t>(quad & 255u), plain.value(ix, iy));
+      ASSERT_EQ(static_cast<std::int8_t>(quad >> 8 & 255u), plain.value(ix + 1, iy));
+      ASSERT_EQ(static_cast<std::int8_t>(quad >> 16 & 255u), plain.value(ix, iy + 1));
+      ASSERT_EQ(static_cast<std::int8_t>(quad >> 24), plain.value(ix + 1, iy + 1));
+    }
+  }
+  EXPECT_EQ(different, 0);
+  EXPECT_GT(standing, 0);
+  for (const TsdfObservation& o : held) plain.remove(o);
+  for (int iy = plain.first_y(); iy < plain.first_y() + plain.size_cells(); ++iy) {
+    for (int ix = plain.first_x(); ix < plain.first_x() + plain.size_cells(); ++ix) {
+      ASSERT_EQ(plain.weight_units(ix, iy), 0);
+      ASSERT_EQ(plain.standing_weight_units(ix, iy), 0);
+    }
+  }
+}
+
 TEST(TsdfGrid, UnknownEntersNoInterpolation) {
   const TsdfConfig config = fixed_truncation(0.4);
   TsdfGrid grid(config, 6.0);
@@ -238,12 +375,13 @@ void expect_equals_fresh_sum(const TsdfGrid& grid, const TsdfConfig& config,
   EXPECT_GT(known, 0);
 }
 
-class AddRemoveProperty : public ::testing::TestWithParam<bool> {};
+/// Sensor is a profile (or a scan), vector code is used.
+class AddRemoveProperty : public ::testing::TestWithParam<std::tuple<bool, bool>> {};
 
 TEST_P(AddRemoveProperty, ExactWhateverTheOrderWithScrollingAndResets) {
-  const bool pinhole = GetParam();
+  const bool pinhole = std::get<0>(GetParam());
   const TsdfConfig config = fixed_truncation(0.3);
-  TsdfGrid grid(config, 3.2);  // 128 x 128 cells: the observations reach out of it
+  TsdfGrid grid(config, 3.2, std::get<1>(GetParam()));  // 128 x 128 cells: the observations reach out of it
   std::map<std::uint32_t, TsdfObservation> held;
   RandomStream random(7, random_stream::kTest, pinhole ? 1 : 2, 0);
   std::uint32_t sequence = 0;
@@ -298,8 +436,11 @@ TEST_P(AddRemoveProperty, ExactWhateverTheOrderWithScrollingAndResets) {
   }
   EXPECT_EQ(left, 0);
 }
-INSTANTIATE_TEST_SUITE_P(Sensors, AddRemoveProperty, ::testing::Values(true, false),
-                         [](const auto& kind) { return kind.param ? "Profile" : "Scan"; });
+INSTANTIATE_TEST_SUITE_P(Sensors, AddRemoveProperty, ::testing::Combine(::testing::Bool(), ::testing::Bool()),
+                         [](const auto& kind) {
+                           return std::string(std::get<0>(kind.param) ? "Profile" : "Scan") +
+                                  (std::get<1>(kind.param) ? "Vectors" : "Plain");
+                         });
 
 TEST(TsdfGrid, SumsHoldAsManyFramesAsPromised) {
   // 3,600 frames at the nearest distance fit the 32-bit sums with a factor of 2.3 to spare.

@@ -17,14 +17,15 @@ namespace knav {
 struct RoomWorld {
   struct Segment {
     double ax, ay, bx, by;
+    HeightClass height = HeightClass::kMiddle;
   };
   std::vector<Segment> walls;
 
-  void box(double low_x, double low_y, double high_x, double high_y) {
-    walls.push_back({low_x, low_y, high_x, low_y});
-    walls.push_back({high_x, low_y, high_x, high_y});
-    walls.push_back({high_x, high_y, low_x, high_y});
-    walls.push_back({low_x, high_y, low_x, low_y});
+  void box(double low_x, double low_y, double high_x, double high_y, HeightClass height = HeightClass::kMiddle) {
+    walls.push_back({low_x, low_y, high_x, low_y, height});
+    walls.push_back({high_x, low_y, high_x, high_y, height});
+    walls.push_back({high_x, high_y, low_x, high_y, height});
+    walls.push_back({low_x, high_y, low_x, low_y, height});
   }
 
   /// 10 m x 7 m with furniture; the robot starts at (0, 0).
@@ -38,7 +39,7 @@ struct RoomWorld {
     return world;
   }
 
-  double range(double x, double y, double angle_rad) const {
+  double range(double x, double y, double angle_rad, HeightClass* height = nullptr) const {
     const double dx = std::cos(angle_rad), dy = std::sin(angle_rad);
     double nearest = std::numeric_limits<double>::infinity();
     for (const Segment& s : walls) {
@@ -46,7 +47,9 @@ struct RoomWorld {
       if (std::fabs(determinant) < 1e-12) continue;
       const double t = ((s.ax - x) * ey - (s.ay - y) * ex) / determinant;
       const double u = ((s.ax - x) * dy - (s.ay - y) * dx) / determinant;
-      if (t > 1e-6 && u >= 0.0 && u <= 1.0) nearest = std::min(nearest, t);
+      if (t <= 1e-6 || u < 0.0 || u > 1.0 || t >= nearest) continue;
+      nearest = t;
+      if (height) *height = s.height;
     }
     return nearest;
   }
@@ -62,7 +65,8 @@ struct RoomWorld {
     for (int u = 0; u < 640; ++u) {
       const double right = (u - profile.cx_px) / profile.fx_px;
       const double angle = T_world_camera.yaw_rad - std::atan(right);
-      const double z = range(T_world_camera.x_m, T_world_camera.y_m, angle) / std::hypot(1.0, right);
+      HeightClass height = HeightClass::kMiddle;
+      const double z = range(T_world_camera.x_m, T_world_camera.y_m, angle, &height) / std::hypot(1.0, right);
       const double noisy = z + 0.0015 * z * z * random.normal();
       const bool seen = z > 0.5 && z < 20.0;
       profile.z_m.push_back(seen ? static_cast<float>(noisy) : std::numeric_limits<float>::quiet_NaN());
@@ -70,7 +74,7 @@ struct RoomWorld {
       profile.free_from_m.push_back(floor ? 1.3f : std::numeric_limits<float>::quiet_NaN());
       profile.free_to_m.push_back(floor ? static_cast<float>(noisy - 0.1)
                                         : std::numeric_limits<float>::quiet_NaN());
-      profile.height_class.push_back(seen ? HeightClass::kMiddle : HeightClass::kNone);
+      profile.height_class.push_back(seen ? height : HeightClass::kNone);
     }
     return profile;
   }

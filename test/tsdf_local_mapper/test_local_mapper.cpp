@@ -192,7 +192,7 @@ TEST_F(LocalMapperTest, ABoxThatLeftTheViewInTheBlindZoneStays) {
   start();
   drive(10, 0.0, 0.0);
   RoomWorld with_box = world_;
-  with_box.box(1.8, -0.2, 2.1, 0.2);
+  with_box.box(1.8, -0.2, 2.1, 0.2, HeightClass::kLow);
   const RoomWorld empty = world_;
   for (int i = 0; i < 60; ++i) {
     robot_.drive(0.02, 0.0);
@@ -210,6 +210,33 @@ TEST_F(LocalMapperTest, ABoxThatLeftTheViewInTheBlindZoneStays) {
     }
   }
   EXPECT_GE(surface, 5);
+}
+
+TEST_F(LocalMapperTest, APersonWhoStoodInTheDoorwayIsGoneAndStaysGone) {
+  // A minute 0.9 m ahead, nearer than the floor is seen; then the robot sees the place for a second and turns away.
+  start();
+  drive(30, 0.0, 0.0);
+  world_.box(0.9, -0.25, 1.3, 0.25);
+  drive(1800, 0.0, 0.0);
+  const auto surfaces = [&] {
+    OccupancyGrid map;
+    mapper_->extract_local_map(&map);
+    int count = 0;
+    for (double y = -0.35; y <= 0.35; y += 0.05) {
+      for (double x = 0.75; x <= 1.5; x += 0.05) {
+        count += map.value[map.geometry.index(map.geometry.cell_x(x), map.geometry.cell_y(y))] == 100 ? 1 : 0;
+      }
+    }
+    return count;
+  };
+  EXPECT_GE(surfaces(), 8);
+  world_ = RoomWorld::furnished();
+  drive(30, 0.0, 0.0);
+  EXPECT_EQ(surfaces(), 0);
+  EXPECT_EQ(mapper_->result().epoch, 0u);
+  for (int i = 0; i < 60; ++i) drive(1, 0.0, 0.05);
+  EXPECT_EQ(surfaces(), 0);
+  EXPECT_EQ(mapper_->result().epoch, 0u);
 }
 
 TEST_F(LocalMapperTest, DuplicateLateAndOutOfOrderFramesChangeNothing) {
