@@ -6,9 +6,14 @@
 #include <vector>
 
 #include "core/contour.h"
+#include "core/multiversion.h"
 #include "core/random.h"
 #include "core/tsdf_alignment.h"
 #include "core/tsdf_grid.h"
+
+#ifdef KNAV_HAVE_AVX2_CODE
+#include <immintrin.h>
+#endif
 
 namespace knav {
 namespace {
@@ -90,6 +95,77 @@ void align(benchmark::State& state) {
                          benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 BENCHMARK(align)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond)->Apply(shortest);
+
+/// Particles within spread_m of the middle of a 1,024 x 1,024 grid of 5 cm, 120 readings up to 12 m away.
+struct Crowd {
+  Crowd(std::size_t count, double spread_m) {
+    particles.resize(count);
+    RandomStream random(1, random_stream::kTest, 1, 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      particles.set(i, {random.uniform(-spread_m, spread_m), random.uniform(-spread_m, spread_m),
+                        random.uniform(-0.1, 0.1) * spread_m});
+    }
+    for (int k = 0; k < 120; ++k) {
+      const double angle = 0.05 * k, range_m = random.uniform(1.0, 12.0);
+      points.add(static_cast<float>(range_m * std::cos(angle)), static_cast<float>(range_m * std::sin(angle)), 1.0f);
+    }
+    for (int iy = 0; iy < 1024; ++iy) {
+      for (int ix = 0; ix < 1024; ++ix) field.set(ix, iy, random.uniform());
+    }
+  }
+  ParticleSet particles;
+  WeightedPoints points;
+  CostField field{GridGeometry{1024, 1024, 0.05, -25.6, -25.6}, 1.0};
+};
+
+void per_reading(benchmark::State& state, std::size_t count) {
+  state.counters["ns_per_particle_reading"] =
+      benchmark::Counter(static_cast<double>(state.iterations()) * static_cast<double>(count) * 120e-9,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
+/// Arguments: particles, spread in centimetres.
+void cost_field(benchmark::State& state, bool interpolate) {
+  const Crowd crowd(static_cast<std::size_t>(state.range(0)), 0.01 * static_cast<double>(state.range(1)));
+  std::vector<float> cost;
+  for (auto _ : state) alignment_costs(crowd.field, crowd.points, crowd.particles, interpolate, &cost);
+  per_reading(state, crowd.particles.size());
+}
+void crowds(benchmark::internal::Benchmark* b) {
+  for (const int spread_cm : {20, 1000}) {
+    for (const int count : {2000, 10000, 50000}) b->Args({count, spread_cm});
+  }
+  b->Unit(benchmark::kMicrosecond);
+  shortest(b);
+}
+BENCHMARK_CAPTURE(cost_field, nearest, false)->Apply(crowds);
+BENCHMARK_CAPTURE(cost_field, bilinear, true)->Apply(crowds);
+
+#ifdef KNAV_HAVE_AVX2_CODE
+KNAV_AVX2 int sum_at(const std::uint32_t* quads, const std::vector<int>& index) {
+  __m256i sum = _mm256_setzero_si256();
+  for (std::size_t k = 0; k + 8 <= index.size(); k += 8) {
+    const __m256i at = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(&index[k]));
+    sum = _mm256_add_epi32(sum, _mm256_i32gather_epi32(reinterpret_cast<const int*>(quads), at, 4));
+  }
+  return _mm256_extract_epi32(sum, 0) + _mm256_extract_epi32(sum, 5);
+}
+/// The limit: the same words read by the same instruction, and nothing else.
+void bare_gather(benchmark::State& state) {
+  const Crowd crowd(static_cast<std::size_t>(state.range(0)), 0.01 * static_cast<double>(state.range(1)));
+  std::vector<int> index;
+  for (std::size_t i = 0; i < crowd.particles.size(); ++i) {
+    const Pose2 T = crowd.particles.pose(i);
+    for (std::size_t k = 0; k < crowd.points.size(); ++k) {
+      const Point2 p = T * Point2{crowd.points.x_m[k], crowd.points.y_m[k]};
+      index.push_back(crowd.field.geometry().cell_y(p.y_m) * 1024 + crowd.field.geometry().cell_x(p.x_m));
+    }
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(sum_at(crowd.field.quads(), index));
+  per_reading(state, crowd.particles.size());
+}
+BENCHMARK(bare_gather)->Apply(crowds);
+#endif
 
 void contour(benchmark::State& state) {
   const TsdfGrid grid = hall(static_cast<double>(state.range(0)));
