@@ -13,7 +13,8 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-/// Lengths along a ray in 2^-32 cells: whole numbers, so that a jump over many edges arrives where single steps do.
+/// Lengths along a ray in 2^-32 cells: whole numbers, so that a jump over many edges arrives where single
+/// steps do.
 using Along = std::int64_t;
 constexpr double kAlongPerCell = 4294967296.0;
 constexpr Along kNever = Along{1} << 56;  ///< longer than any ray, and 32 of them still fit
@@ -107,12 +108,13 @@ float newest_seen(const TsdfGrid& grid, int ix, int iy) {
   return seen;
 }
 
-RayEnd cast(const TsdfGrid& grid, const ContourConfig& config, const FreeBlocks* blocks, double x_m, double y_m,
-            double dir_x, double dir_y, double length_m) {
+RayEnd cast(const TsdfGrid& grid, const ContourConfig& config, const FreeBlocks* blocks, double x_m,
+            double y_m, double dir_x, double dir_y, double length_m) {
   const double scale = 1.0 / grid.resolution_m();
   const double x = x_m * scale - 0.5, y = y_m * scale - 0.5;  // quad corners (cell centres) at integers
   const auto along = [scale](double metres) { return static_cast<Along>(metres * scale * kAlongPerCell); };
-  const Along length = along(length_m), blind = along(config.blind_radius_m), gap = along(config.unknown_gap_m);
+  const Along length = along(length_m), blind = along(config.blind_radius_m),
+              gap = along(config.unknown_gap_m);
   const std::uint32_t* const quads = grid.quads();
   QuadWalk walk(x, y, dir_x, dir_y);
   Along entered = 0;       // where the ray entered the present quad
@@ -140,8 +142,8 @@ RayEnd cast(const TsdfGrid& grid, const ContourConfig& config, const FreeBlocks*
     } else if (blocks && blocks->unknown(walk.ix, walk.iy)) {
       // Only where the stretch of unknown may not end the ray.
       int ix, iy;
-      if (walk.leave_block(FreeBlocks::kShift[0], std::min(length, std::max(unknown_from, blind) + gap), &entered, &ix,
-                           &iy)) {
+      if (walk.leave_block(FreeBlocks::kShift[0], std::min(length, std::max(unknown_from, blind) + gap),
+                           &entered, &ix, &iy)) {
         positive_at = -1;
         continue;
       }

@@ -17,8 +17,8 @@ std::uint8_t quantized(double cost) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(cost, 0.0, 1.0) * 255.0));
 }
 
-// A reading's place between cell centres is taken to 1/128 of a cell, so that interpolating is whole-number arithmetic
-// of bytes: exact, hence the same in plain and in vector code.
+// A reading's place between cell centres is taken to 1/128 of a cell, so that interpolating is whole-number
+// arithmetic of bytes: exact, hence the same in plain and in vector code.
 constexpr int kSubcellBits = 7;
 constexpr int kShare = 127;  ///< the two shares along one axis sum to this
 
@@ -90,7 +90,8 @@ KNAV_AVX2 std::size_t add_costs_avx2(const View& v, const WeightedPoints& points
     const __m256i sx = _mm256_cvttps_epi32(gx), sy = _mm256_cvttps_epi32(gy);
     const __m256i ix = kInterpolate ? _mm256_srli_epi32(sx, kSubcellBits) : sx;
     const __m256i iy = kInterpolate ? _mm256_srli_epi32(sy, kSubcellBits) : sy;
-    const __m256i quad = _mm256_i32gather_epi32(quads, _mm256_add_epi32(_mm256_mullo_epi32(iy, width), ix), 4);
+    const __m256i quad =
+        _mm256_i32gather_epi32(quads, _mm256_add_epi32(_mm256_mullo_epi32(iy, width), ix), 4);
     __m256i value;
     if (kInterpolate) {
       // Shares along x as bytes [127 - t, t, 127 - t, t], along y as words [127 - t, t]; 127 - t = t ^ 127.

@@ -47,12 +47,14 @@ void FreeBlocks::build(const TsdfGrid& grid, double x_m, double y_m, double reac
     for (int row = y; row < y + kStep; ++row) {
       for (int x = low_x; x < high_x;) {
         const int piece = std::min(high_x - x, grid.size_cells() - (x & mask_));
-        gather_bits(grid.quads() + grid.quad_index(x, row), piece, bad_.data() + (x - low_x), known_.data() + (x - low_x));
+        gather_bits(grid.quads() + grid.quad_index(x, row), piece, bad_.data() + (x - low_x),
+                    known_.data() + (x - low_x));
         x += piece;
       }
     }
     const int side_bits = bits_ - kShift[0];
-    std::uint8_t* const out = kind_[0].data() + (static_cast<std::size_t>((y & mask_) >> kShift[0]) << side_bits);
+    std::uint8_t* const out =
+        kind_[0].data() + (static_cast<std::size_t>((y & mask_) >> kShift[0]) << side_bits);
     for (int x = low_x; x < high_x; x += kStep) {
       std::uint32_t bad = 0, known = 0;
       for (int j = 0; j < kStep; ++j) {
@@ -69,7 +71,8 @@ void FreeBlocks::build(const TsdfGrid& grid, double x_m, double y_m, double reac
       for (int x = 0; x < side; ++x) {
         bool all = true;
         for (int j = 0; j < ratio * ratio && all; ++j) {
-          all = kind_[level - 1][static_cast<std::size_t>((y * ratio + j / ratio) * fine_side + x * ratio + j % ratio)] == kFree;
+          all = kind_[level - 1][static_cast<std::size_t>((y * ratio + j / ratio) * fine_side + x * ratio +
+                                                          j % ratio)] == kFree;
         }
         kind_[level][static_cast<std::size_t>(y * side + x)] = all ? kFree : kMixed;
       }

@@ -7,8 +7,8 @@
 
 namespace knav {
 
-/// Which square blocks of quads hold nothing but free space, or nothing but unknown, so that a ray may cross them in one
-/// step without passing over anything: what it would have found in each of their cells is known.
+/// Which square blocks of quads hold nothing but free space, or nothing but unknown, so that a ray may cross
+/// them in one step without passing over anything: what it would have found in each of their cells is known.
 class FreeBlocks {
  public:
   static constexpr int kLevels = 2;
@@ -17,7 +17,8 @@ class FreeBlocks {
   /// Looks at the blocks within `reach_m` of the point.
   void build(const TsdfGrid& grid, double x_m, double y_m, double reach_m);
 
-  /// Whether each quad of the block round quad (ix, iy) is known in all corners, negative in none and above zero in one.
+  /// Whether each quad of the block round quad (ix, iy) is known in all corners, negative in none and above
+  /// zero in one.
   bool free(int level, int ix, int iy) const {
     const int shift = kShift[level], bits = bits_ - shift;
     const int x = (ix & mask_) >> shift, y = (iy & mask_) >> shift;
@@ -26,7 +27,8 @@ class FreeBlocks {
   /// Whether all corners of each quad of the block of the finest level round quad (ix, iy) are unknown.
   bool unknown(int ix, int iy) const {
     const int x = (ix & mask_) >> kShift[0], y = (iy & mask_) >> kShift[0];
-    return kind_[0][(static_cast<std::size_t>(y) << (bits_ - kShift[0])) | static_cast<std::size_t>(x)] == kUnknown;
+    return kind_[0][(static_cast<std::size_t>(y) << (bits_ - kShift[0])) | static_cast<std::size_t>(x)] ==
+           kUnknown;
   }
 
  private:

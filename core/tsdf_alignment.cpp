@@ -13,8 +13,8 @@
 namespace knav {
 namespace {
 
-// A reading's place within its four cells is taken to 1/256 of a cell (0.2 mm), so that interpolating is whole-number
-// arithmetic of bytes: exact, hence the same in plain and in vector code.
+// A reading's place within its four cells is taken to 1/256 of a cell (0.2 mm), so that interpolating is
+// whole-number arithmetic of bytes: exact, hence the same in plain and in vector code.
 constexpr int kSubcellBits = 8;
 constexpr float kSubcells = 256.0f;
 constexpr int kShares = 255 * 255;  ///< what the four shares of a reading sum to
@@ -43,7 +43,8 @@ void add_costs(const Window& w, const ScaledPose& pose, const WeightedPoints& po
     float cost = w.off_window;
     if (gx >= 0.0f && gy >= 0.0f && gx < w.last && gy < w.last) {
       const int sx = static_cast<int>(gx), sy = static_cast<int>(gy);  // not negative: truncation is floor
-      const int ix = ((sx >> kSubcellBits) + w.first_x) & w.mask, iy = ((sy >> kSubcellBits) + w.first_y) & w.mask;
+      const int ix = ((sx >> kSubcellBits) + w.first_x) & w.mask,
+                iy = ((sy >> kSubcellBits) + w.first_y) & w.mask;
       const std::uint32_t quad = w.quads[iy * w.stride + ix];
       const int tx = sx & 255, ty = sy & 255;
       const int share[4] = {(255 - tx) * (255 - ty), tx * (255 - ty), (255 - tx) * ty, tx * ty};
@@ -93,17 +94,16 @@ KNAV_AVX2 std::size_t add_costs_avx2(const Window& w, const ScaledPose& pose, co
       gy = _mm256_and_ps(gy, inside);
     }
     const __m256i sx = _mm256_cvttps_epi32(gx), sy = _mm256_cvttps_epi32(gy);
-    const __m256i ix =
-        _mm256_and_si256(_mm256_add_epi32(_mm256_srli_epi32(sx, kSubcellBits), first_x), mask);
-    const __m256i iy =
-        _mm256_and_si256(_mm256_add_epi32(_mm256_srli_epi32(sy, kSubcellBits), first_y), mask);
-    const __m256i quad = _mm256_i32gather_epi32(quads, _mm256_add_epi32(_mm256_mullo_epi32(iy, stride), ix), 4);
+    const __m256i ix = _mm256_and_si256(_mm256_add_epi32(_mm256_srli_epi32(sx, kSubcellBits), first_x), mask);
+    const __m256i iy = _mm256_and_si256(_mm256_add_epi32(_mm256_srli_epi32(sy, kSubcellBits), first_y), mask);
+    const __m256i quad =
+        _mm256_i32gather_epi32(quads, _mm256_add_epi32(_mm256_mullo_epi32(iy, stride), ix), 4);
     // Shares along x as bytes [255 - t, t, 255 - t, t], along y as words [255 - t, t]; 255 - t = t ^ 255.
     const __m256i share_x = _mm256_xor_si256(_mm256_shuffle_epi8(sx, all_bytes), flip_x);
     const __m256i share_y = _mm256_xor_si256(_mm256_shuffle_epi8(sy, both_words), flip_y);
     const __m256i missing = _mm256_cmpeq_epi8(quad, unknown);
-    const __m256i value = _mm256_madd_epi16(
-        _mm256_maddubs_epi16(share_x, _mm256_andnot_si256(missing, quad)), share_y);
+    const __m256i value =
+        _mm256_madd_epi16(_mm256_maddubs_epi16(share_x, _mm256_andnot_si256(missing, quad)), share_y);
     __m256 cost = _mm256_cvtepi32_ps(_mm256_abs_epi32(value));
     if (!_mm256_testz_si256(missing, missing)) {
       const __m256i lost = _mm256_madd_epi16(

@@ -10,7 +10,7 @@
 namespace knav {
 namespace {
 
-constexpr std::int8_t kSupport = 76;       ///< 0.6: cells below this have a surface near
+constexpr std::int8_t kSupport = 76;        ///< 0.6: cells below this have a surface near
 constexpr std::int8_t kFrontContrast = 76;  ///< by this much a cell must be freer than it was known to be
 
 std::int8_t value_of(std::int32_t weighted_sum, std::int32_t weight) {
@@ -48,10 +48,11 @@ inline Part part_of(const TsdfRules& rules, const TsdfObservation& o, std::size_
   return part;
 }
 
-/// Whether the cell holds a surface that this observation sees through. Surfaces of middle height stay in view down to
-/// middle_clear_from_m, so the blind zone's lower end does not protect them; low and high ones it does.
-inline bool contradicts(const TsdfRules& rules, const TsdfObservation& o, std::size_t u, float d, const Part& part,
-                        std::int8_t held, bool standing) {
+/// Whether the cell holds a surface that this observation sees through. Surfaces of middle height stay in
+/// view down to middle_clear_from_m, so the blind zone's lower end does not protect them; low and high ones
+/// it does.
+inline bool contradicts(const TsdfRules& rules, const TsdfObservation& o, std::size_t u, float d,
+                        const Part& part, std::int8_t held, bool standing) {
   if (held == TsdfGrid::kUnknown || held >= kSupport) return false;
   if (!(d > o.clear_from_m[u] && d + 2.0f * rules.resolution_m < o.clear_to_m[u])) return false;
   if (part.carved) return !standing || d <= rules.standing_clear_to_m;
@@ -119,12 +120,13 @@ KNAV_AVX2 inline Part8 part_of8(const TsdfRules& rules, const TsdfObservation& o
   const __m256 one = _mm256_set1_ps(1.0f), zero = _mm256_setzero_ps();
   const __m256 eta = _mm256_sub_ps(_mm256_i32gather_ps(o.range_m.data(), u, 4), d);
   const __m256 f = _mm256_mul_ps(eta, _mm256_i32gather_ps(o.inverse_truncation_per_m.data(), u, 4));
-  const __m256 near_surface = _mm256_and_ps(_mm256_cmp_ps(f, _mm256_set1_ps(-1.0f), _CMP_GE_OQ),
-                                            _mm256_cmp_ps(f, one, _CMP_LT_OQ));
+  const __m256 near_surface =
+      _mm256_and_ps(_mm256_cmp_ps(f, _mm256_set1_ps(-1.0f), _CMP_GE_OQ), _mm256_cmp_ps(f, one, _CMP_LT_OQ));
   const __m256 free_from = _mm256_i32gather_ps(o.free_from_m.data(), u, 4);
   const __m256 carved = _mm256_andnot_ps(
-      near_surface, _mm256_and_ps(_mm256_cmp_ps(d, free_from, _CMP_GE_OQ),
-                                  _mm256_cmp_ps(d, _mm256_i32gather_ps(o.free_to_m.data(), u, 4), _CMP_LE_OQ)));
+      near_surface,
+      _mm256_and_ps(_mm256_cmp_ps(d, free_from, _CMP_GE_OQ),
+                    _mm256_cmp_ps(d, _mm256_i32gather_ps(o.free_to_m.data(), u, 4), _CMP_LE_OQ)));
   part.f = _mm256_blendv_ps(one, f, near_surface);
   const __m256 floor2 = _mm256_set1_ps(rules.weight_range_floor_m * rules.weight_range_floor_m);
   const __m256 square = _mm256_max_ps(_mm256_mul_ps(d, d), floor2);
@@ -152,7 +154,8 @@ KNAV_AVX2 inline Part8 part_of8(const TsdfRules& rules, const TsdfObservation& o
 
 /// value_of() for eight cells, as eight bytes.
 KNAV_AVX2 inline std::uint64_t values_of8(__m256i weighted_sum, __m256i weight) {
-  const __m256 scaled = _mm256_mul_ps(_mm256_set1_ps(TsdfGrid::kValueScale), _mm256_cvtepi32_ps(weighted_sum));
+  const __m256 scaled =
+      _mm256_mul_ps(_mm256_set1_ps(TsdfGrid::kValueScale), _mm256_cvtepi32_ps(weighted_sum));
   const __m256 f = _mm256_div_ps(scaled, _mm256_cvtepi32_ps(weight));
   const __m256 down = _mm256_cmp_ps(f, _mm256_setzero_ps(), _CMP_LT_OQ);
   const __m256 rounding = _mm256_or_ps(_mm256_set1_ps(0.5f), _mm256_and_ps(down, _mm256_set1_ps(-0.0f)));
@@ -186,8 +189,8 @@ KNAV_AVX2 inline void store_values(std::uint64_t value, int k, const TsdfCells& 
 
 /// Whole groups of eight; returns how many cells it has done.
 KNAV_AVX2 int add_to_cells_avx2(const TsdfRules& rules, const TsdfObservation& o, const std::int32_t* column,
-                                const float* distance_m, int count, const TsdfCells& cells, TsdfChange* change,
-                                std::uint64_t* contradicted) {
+                                const float* distance_m, int count, const TsdfCells& cells,
+                                TsdfChange* change, std::uint64_t* contradicted) {
   const __m256 age = _mm256_set1_ps(o.age_clock_s);
   int k = 0;
   for (; k + 8 <= count; k += 8) {
@@ -201,20 +204,23 @@ KNAV_AVX2 int add_to_cells_avx2(const TsdfRules& rules, const TsdfObservation& o
     const __m256i held = _mm256_cvtepi8_epi32(held8);
     const __m256i surface = _mm256_and_si256(_mm256_cmpgt_epi32(_mm256_set1_epi32(kSupport), held),
                                              _mm256_cmpgt_epi32(held, _mm256_set1_epi32(TsdfGrid::kUnknown)));
-    const __m256 contrast = _mm256_sub_ps(_mm256_mul_ps(_mm256_set1_ps(TsdfGrid::kValueScale), part.f),
-                                          _mm256_cvtepi32_ps(held));
+    const __m256 contrast =
+        _mm256_sub_ps(_mm256_mul_ps(_mm256_set1_ps(TsdfGrid::kValueScale), part.f), _mm256_cvtepi32_ps(held));
     const __m256i agrees = _mm256_andnot_si256(
-        _mm256_castps_si256(_mm256_cmp_ps(contrast, _mm256_set1_ps(kFrontContrast), _CMP_GT_OQ)), part.near_surface);
+        _mm256_castps_si256(_mm256_cmp_ps(contrast, _mm256_set1_ps(kFrontContrast), _CMP_GT_OQ)),
+        part.near_surface);
     const __m256i touched = _mm256_and_si256(seen, _mm256_or_si256(part.near_surface, part.carved));
     const __m256i concerned = _mm256_or_si256(touched, _mm256_and_si256(part.before_free, seen));
     const __m256i doubtful = _mm256_and_si256(_mm256_andnot_si256(agrees, surface), concerned);
     if (!_mm256_testz_si256(doubtful, doubtful) || bytes8(cells.contradictions + k) != 0) {
-      for (int j = k; j < k + 8; ++j) add_to_cell(rules, o, column, distance_m, j, cells, change, contradicted);
+      for (int j = k; j < k + 8; ++j)
+        add_to_cell(rules, o, column, distance_m, j, cells, change, contradicted);
       continue;
     }
     if (_mm256_testz_si256(touched, touched)) continue;
     const __m256i dw = _mm256_and_si256(part.weight, touched);
-    const __m256i sum = _mm256_add_epi32(load8(cells.weighted_sum + k), _mm256_and_si256(part.weighted, touched));
+    const __m256i sum =
+        _mm256_add_epi32(load8(cells.weighted_sum + k), _mm256_and_si256(part.weighted, touched));
     const __m256i weight = _mm256_add_epi32(load8(cells.weight + k), dw);
     store8(cells.weighted_sum + k, sum);
     store8(cells.weight + k, weight);
@@ -223,7 +229,8 @@ KNAV_AVX2 int add_to_cells_avx2(const TsdfRules& rules, const TsdfObservation& o
       const __m256i near_seen = _mm256_and_si256(part.near_surface, seen);
       if (!_mm256_testz_si256(near_seen, near_seen)) {
         const __m256i mask = _mm256_and_si256(
-            near_seen, _mm256_i32gather_epi32(o.standing.data(), _mm256_max_epi32(u, _mm256_setzero_si256()), 4));
+            near_seen,
+            _mm256_i32gather_epi32(o.standing.data(), _mm256_max_epi32(u, _mm256_setzero_si256()), 4));
         store8(cells.standing_weight + k,
                _mm256_add_epi32(load8(cells.standing_weight + k), _mm256_and_si256(dw, mask)));
       }
@@ -233,9 +240,9 @@ KNAV_AVX2 int add_to_cells_avx2(const TsdfRules& rules, const TsdfObservation& o
   return k;
 }
 
-KNAV_AVX2 int remove_from_cells_avx2(const TsdfRules& rules, const TsdfObservation& o, const std::int32_t* column,
-                                     const float* distance_m, int count, const TsdfCells& cells,
-                                     TsdfChange* change) {
+KNAV_AVX2 int remove_from_cells_avx2(const TsdfRules& rules, const TsdfObservation& o,
+                                     const std::int32_t* column, const float* distance_m, int count,
+                                     const TsdfCells& cells, TsdfChange* change) {
   const __m256i sequence = _mm256_set1_epi32(static_cast<int>(o.sequence));
   int k = 0;
   for (; k + 8 <= count; k += 8) {
@@ -248,14 +255,16 @@ KNAV_AVX2 int remove_from_cells_avx2(const TsdfRules& rules, const TsdfObservati
     const __m256i touched = _mm256_and_si256(seen, _mm256_or_si256(part.near_surface, part.carved));
     if (_mm256_testz_si256(touched, touched)) continue;
     const __m256i dw = _mm256_and_si256(part.weight, touched);
-    const __m256i sum = _mm256_sub_epi32(load8(cells.weighted_sum + k), _mm256_and_si256(part.weighted, touched));
+    const __m256i sum =
+        _mm256_sub_epi32(load8(cells.weighted_sum + k), _mm256_and_si256(part.weighted, touched));
     const __m256i weight = _mm256_sub_epi32(load8(cells.weight + k), dw);
     store8(cells.weighted_sum + k, sum);
     store8(cells.weight + k, weight);
     if (o.any_standing) {
       const __m256i near_seen = _mm256_and_si256(part.near_surface, seen);
       if (!_mm256_testz_si256(near_seen, near_seen)) {
-        const __m256i mask = _mm256_and_si256(near_seen, _mm256_i32gather_epi32(o.standing.data(), safe_u, 4));
+        const __m256i mask =
+            _mm256_and_si256(near_seen, _mm256_i32gather_epi32(o.standing.data(), safe_u, 4));
         store8(cells.standing_weight + k,
                _mm256_sub_epi32(load8(cells.standing_weight + k), _mm256_and_si256(dw, mask)));
       }
@@ -270,7 +279,8 @@ KNAV_AVX2 int remove_from_cells_avx2(const TsdfRules& rules, const TsdfObservati
 }  // namespace
 
 TsdfChange add_to_cells(const TsdfRules& rules, const TsdfObservation& o, const std::int32_t* column,
-                        const float* distance_m, int count, const TsdfCells& cells, std::uint64_t* contradicted) {
+                        const float* distance_m, int count, const TsdfCells& cells,
+                        std::uint64_t* contradicted) {
   TsdfChange change;
   int k = 0;
 #ifdef KNAV_HAVE_AVX2_CODE

@@ -23,9 +23,9 @@ struct TsdfRules {
   float weight_range_floor_m = 0.0f;
   float resolution_m = 0.0f;
   int contradictions_to_reset = 0;
-  float middle_clear_from_m = 0.0f;   ///< nearer than this even a middle thing is out of view
-  float standing_clear_to_m = 0.0f;   ///< beyond this a low thing is no longer seen
-  float front_clear_to_m = 0.0f;      ///< see TsdfConfig::front_clear_range_m
+  float middle_clear_from_m = 0.0f;  ///< nearer than this even a middle thing is out of view
+  float standing_clear_to_m = 0.0f;  ///< beyond this a low thing is no longer seen
+  float front_clear_to_m = 0.0f;     ///< see TsdfConfig::front_clear_range_m
   bool vectors = true;
 };
 
@@ -44,9 +44,11 @@ struct TsdfChange {
 /// @param distance_m  of its centre from the sensor
 /// @param contradicted  receives how many cells were reset
 /// The same bytes with and without vectors.
-TsdfChange add_to_cells(const TsdfRules& rules, const TsdfObservation& observation, const std::int32_t* column,
-                        const float* distance_m, int count, const TsdfCells& cells, std::uint64_t* contradicted);
-TsdfChange remove_from_cells(const TsdfRules& rules, const TsdfObservation& observation, const std::int32_t* column,
-                             const float* distance_m, int count, const TsdfCells& cells);
+TsdfChange add_to_cells(const TsdfRules& rules, const TsdfObservation& observation,
+                        const std::int32_t* column, const float* distance_m, int count,
+                        const TsdfCells& cells, std::uint64_t* contradicted);
+TsdfChange remove_from_cells(const TsdfRules& rules, const TsdfObservation& observation,
+                             const std::int32_t* column, const float* distance_m, int count,
+                             const TsdfCells& cells);
 
 }  // namespace knav

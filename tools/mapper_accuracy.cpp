@@ -74,7 +74,8 @@ double ScanAccuracy::quantile_m(double share) const {
   return sorted[static_cast<std::size_t>(at)];
 }
 
-MapperAccuracy measure_mapper(const ProfileRecording& recording, const LocalMapperConfig& config, bool scans) {
+MapperAccuracy measure_mapper(const ProfileRecording& recording, const LocalMapperConfig& config,
+                              bool scans) {
   MapperAccuracy accuracy;
   LocalMapper mapper(config);
   MapperTrajectory trajectory;
@@ -89,7 +90,8 @@ MapperAccuracy measure_mapper(const ProfileRecording& recording, const LocalMapp
     const double out_s = profile.stamp_s + 1.0 / 60.0;
     for (; next_odometry < recording.odometry.size() && recording.odometry[next_odometry].stamp_s <= out_s;
          ++next_odometry) {
-      mapper.add_odometry(recording.odometry[next_odometry].stamp_s, recording.odometry[next_odometry].T_map_robot);
+      mapper.add_odometry(recording.odometry[next_odometry].stamp_s,
+                          recording.odometry[next_odometry].T_map_robot);
     }
     const LocalMapperResult& result = mapper.update(profile, recording.T_base_camera);
     trajectory.add(result);
@@ -97,7 +99,9 @@ MapperAccuracy measure_mapper(const ProfileRecording& recording, const LocalMapp
       last_lifespan_s = result.particle_lifespan_s;
       accuracy.lifespan_s.push_back(last_lifespan_s);
     }
-    if (!scans || next_scan == recording.perfect_scans.size() || recording.perfect_scans[next_scan].frame != i) continue;
+    if (!scans || next_scan == recording.perfect_scans.size() ||
+        recording.perfect_scans[next_scan].frame != i)
+      continue;
     ProfileRecording::perfect_scan(recording.perfect_scans[next_scan++], &perfect);
     if (!result.accepted) continue;
     mapper.extract_scan_360(&scan);
@@ -114,7 +118,8 @@ MapperAccuracy measure_mapper(const ProfileRecording& recording, const LocalMapp
   accuracy.odometry = trajectory.odometry();
   accuracy.epochs = trajectory.epochs();
   accuracy.path_m = trajectory.path_m();
-  if (recording.frames() > 0) accuracy.duration_s = recording.stamp_s(recording.frames() - 1) - recording.stamp_s(0);
+  if (recording.frames() > 0)
+    accuracy.duration_s = recording.stamp_s(recording.frames() - 1) - recording.stamp_s(0);
   return accuracy;
 }
 

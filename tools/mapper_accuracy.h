@@ -9,12 +9,12 @@
 namespace knav {
 
 /// The virtual scan beside a perfect scanner's, over the rays whose evidence is younger than 10 s.
-/// A false obstacle is a return more than 0.3 m (and 5 %) nearer than anything within 0.1 m beside its ray; a miss
-/// is a thing within 8 m that the ray passes by as much.
+/// A false obstacle is a return more than 0.3 m (and 5 %) nearer than anything within 0.1 m beside its ray; a
+/// miss is a thing within 8 m that the ray passes by as much.
 struct ScanAccuracy {
-  std::uint64_t rays = 0;          ///< young enough: returns and rays seen free
+  std::uint64_t rays = 0;  ///< young enough: returns and rays seen free
   std::uint64_t false_obstacles = 0, misses = 0;
-  std::vector<float> error_m;      ///< absolute, of returns whose true range is within 8 m, unsorted
+  std::vector<float> error_m;  ///< absolute, of returns whose true range is within 8 m, unsorted
 
   void add(const RangeScan& virtual_scan, double evidence_decay_s, const RangeScan& perfect);
   void add(const ScanAccuracy& other);
@@ -29,7 +29,7 @@ struct MapperAccuracy {
   bool lost = false;                    ///< some segment of 20 m is more than 2 m off
   int epochs = 1;
   double path_m = 0.0, duration_s = 0.0, elapsed_s = 0.0;
-  std::vector<double> lifespan_s;       ///< of the generations of particles
+  std::vector<double> lifespan_s;  ///< of the generations of particles
   ScanAccuracy scan;
   Trajectory estimate, odometry;
 };

@@ -4,8 +4,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <numeric>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "core/config.h"
 #include "core/error.h"
@@ -17,7 +17,8 @@ namespace knav {
 namespace {
 
 constexpr char kHelp[] =
-    "Simulates drives of about 250 m (once; kept in --cache, about 50 MB each), maps them open loop and compares\n"
+    "Simulates drives of about 250 m (once; kept in --cache, about 50 MB each), maps them open loop and "
+    "compares\n"
     "trajectory and virtual scan with the truth. Rows of the table:\n"
     "  calibrated  a Kinect after calibration, odometry a few per cent wrong\n"
     "  default     a Kinect as bought, uncalibrated: up to 10 % wrong at 10 m\n"
@@ -67,8 +68,9 @@ nlohmann::json to_json(const ErrorStatistics& e, double length_m) {
 }
 
 double mean_of(const std::vector<double>& values) {
-  return values.empty() ? std::numeric_limits<double>::quiet_NaN()
-                        : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  return values.empty()
+             ? std::numeric_limits<double>::quiet_NaN()
+             : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
 nlohmann::json scan_json(const ScanAccuracy& scan) {
@@ -83,8 +85,12 @@ nlohmann::json scan_json(const ScanAccuracy& scan) {
 }
 
 nlohmann::json run_json(int seed, const MapperAccuracy& a) {
-  nlohmann::json json = {{"seed", seed},           {"lost", a.lost},           {"epochs", a.epochs},
-                         {"path_m", a.path_m},     {"duration_s", a.duration_s}, {"elapsed_s", a.elapsed_s},
+  nlohmann::json json = {{"seed", seed},
+                         {"lost", a.lost},
+                         {"epochs", a.epochs},
+                         {"path_m", a.path_m},
+                         {"duration_s", a.duration_s},
+                         {"elapsed_s", a.elapsed_s},
                          {"lifespan_mean_s", mean_of(a.lifespan_s)}};
   for (std::size_t k = 0; k < 3; ++k) {
     const std::string length = fmt::format("{:.0f}", MapperAccuracy::kLengths_m[k]);
@@ -96,21 +102,24 @@ nlohmann::json run_json(int seed, const MapperAccuracy& a) {
 }
 
 void print_head() {
-  fmt::print("{:<11} {:>5} {:>8} {:>8} {:>8} {:>10} {:>11} {:>5} {:>9} {:>9} {:>8} {:>7} {:>7}\n", "row", "seed",
-             "20 m, %", "50 m, %", "100 m, %", "deg/100 m", "worst/mean", "lost", "lifespan", "scan med.", "p95",
-             "false %", "miss %");
+  fmt::print("{:<11} {:>5} {:>8} {:>8} {:>8} {:>10} {:>11} {:>5} {:>9} {:>9} {:>8} {:>7} {:>7}\n", "row",
+             "seed", "20 m, %", "50 m, %", "100 m, %", "deg/100 m", "worst/mean", "lost", "lifespan",
+             "scan med.", "p95", "false %", "miss %");
 }
 
-void print_line(const std::string& name, const std::string& seed, const nlohmann::json& r, double worst_to_mean) {
+void print_line(const std::string& name, const std::string& seed, const nlohmann::json& r,
+                double worst_to_mean) {
   const auto percent = [&](const char* length) {
     return r["segments"][length]["translation_mean_percent"].get<double>();
   };
   const auto scan = [&](const char* key) { return r.contains("scan") ? r["scan"][key].get<double>() : NAN; };
-  fmt::print("{:<11} {:>5} {:>8.3f} {:>8.3f} {:>8.3f} {:>10.3f} {:>11.2f} {:>5} {:>7.2f} s {:>7.3f} m {:>6.3f} m {:>7.2f} {:>7.2f}\n",
-             name, seed, percent("20"), percent("50"), percent("100"),
-             r["segments"]["100"]["rotation_mean_deg"].get<double>(), worst_to_mean, r["lost"].get<int>(),
-             r["lifespan_mean_s"].get<double>(), scan("error_median_m"), scan("error_p95_m"),
-             scan("false_obstacle_percent"), scan("miss_percent"));
+  fmt::print(
+      "{:<11} {:>5} {:>8.3f} {:>8.3f} {:>8.3f} {:>10.3f} {:>11.2f} {:>5} {:>7.2f} s {:>7.3f} m {:>6.3f} m "
+      "{:>7.2f} {:>7.2f}\n",
+      name, seed, percent("20"), percent("50"), percent("100"),
+      r["segments"]["100"]["rotation_mean_deg"].get<double>(), worst_to_mean, r["lost"].get<int>(),
+      r["lifespan_mean_s"].get<double>(), scan("error_median_m"), scan("error_p95_m"),
+      scan("false_obstacle_percent"), scan("miss_percent"));
   std::fflush(stdout);
 }
 
@@ -161,8 +170,8 @@ void benchmark(const Options& options) {
     }
   }
   if (missing > 0) {
-    fmt::print(stderr, "{} drives are not in {} yet; simulating them takes about {:.0f} min of one core.\n", missing,
-               options.cache, missing * (options.quick ? 0.6 : 3.5));
+    fmt::print(stderr, "{} drives are not in {} yet; simulating them takes about {:.0f} min of one core.\n",
+               missing, options.cache, missing * (options.quick ? 0.6 : 3.5));
   }
   nlohmann::json json;
   if (!options.record_only) print_head();
@@ -198,7 +207,8 @@ void benchmark(const Options& options) {
     double worst_to_mean = 0.0;
     const nlohmann::json mean = mean_json(runs, scan, &worst_to_mean);
     print_line(name, "mean", mean, worst_to_mean);
-    json[name] = {{"world", row.world}, {"sensor", row.sensor}, {"seeds", seeds}, {"runs", runs}, {"mean", mean}};
+    json[name] = {
+        {"world", row.world}, {"sensor", row.sensor}, {"seeds", seeds}, {"runs", runs}, {"mean", mean}};
   }
   if (!options.record_only) write_json(options.json, json.dump(2));
 }
@@ -225,15 +235,18 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--mapper-seed", options.mapper_seed, "Seed of the mapper; otherwise that of the drive");
   app.add_option("--config", options.config, "Configuration file; its front end and 'local_mapper' are used");
-  app.add_option("--worlds", options.worlds, "Folder of brin_building.yaml, brin_people.yaml and brin_tour.yaml")
+  app.add_option("--worlds", options.worlds,
+                 "Folder of brin_building.yaml, brin_people.yaml and brin_tour.yaml")
       ->capture_default_str();
   app.add_option("--cache", options.cache, "Folder of the simulated drives")->capture_default_str();
   app.add_option("--json", options.json, "Write all figures here ('-' for standard output)");
   app.add_option("--trajectories", options.trajectories,
                  "Write ROW-SEED.tum, .odometry.tum and .truth.tum into this existing folder");
   app.add_flag("--quick", options.quick, "One seed and the first 75 s of the drive; under 3 minutes");
-  app.add_flag("--fresh", options.fresh, "Simulate again what is in the cache (after a change of the simulator)");
-  app.add_flag("--record-only", options.record_only, "Fill the cache only; several such processes may share it");
+  app.add_flag("--fresh", options.fresh,
+               "Simulate again what is in the cache (after a change of the simulator)");
+  app.add_flag("--record-only", options.record_only,
+               "Fill the cache only; several such processes may share it");
   app.add_flag("--no-scans", options.no_scans, "Leave the virtual scan out");
   app.footer(knav::kJsonHelp);
   return knav::run_command(app, argc, argv, [&] { knav::benchmark(options); });

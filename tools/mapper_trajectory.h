@@ -5,7 +5,8 @@
 
 namespace knav {
 
-/// The robot's way as the local mapper tells it. Across epochs it goes on by odometry. It starts at the origin.
+/// The robot's way as the local mapper tells it. Across epochs it goes on by odometry. It starts at the
+/// origin.
 class MapperTrajectory {
  public:
   /// Takes what the mapper said of a frame; one that was not accepted changes nothing.

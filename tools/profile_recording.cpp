@@ -32,7 +32,8 @@ template <class T>
 void write(std::ostream& out, const std::vector<T>& values) {
   static_assert(std::is_trivially_copyable_v<T>);
   write(out, static_cast<std::uint64_t>(values.size()));
-  out.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
+  out.write(reinterpret_cast<const char*>(values.data()),
+            static_cast<std::streamsize>(values.size() * sizeof(T)));
 }
 template <class T>
 void read(std::istream& in, T* value) {
@@ -102,7 +103,8 @@ void ProfileRecording::perfect_scan(const PerfectScan& scan, RangeScan* out) {
   out->range_max_m = 32.0;
   out->range_m.resize(scan.range.size());
   for (std::size_t i = 0; i < scan.range.size(); ++i) {
-    out->range_m[i] = scan.range[i] == kNothing ? std::numeric_limits<float>::infinity() : unpacked(scan.range[i]);
+    out->range_m[i] =
+        scan.range[i] == kNothing ? std::numeric_limits<float>::infinity() : unpacked(scan.range[i]);
   }
 }
 

@@ -10,14 +10,15 @@
 
 namespace knav {
 
-/// A simulated drive as the mapper sees it (profiles and odometry), with the truth. Distances are kept in steps of
-/// half a millimetre, which is far below the sensor's own, so that minutes of driving fit in memory.
+/// A simulated drive as the mapper sees it (profiles and odometry), with the truth. Distances are kept in
+/// steps of half a millimetre, which is far below the sensor's own, so that minutes of driving fit in memory.
 class ProfileRecording {
  public:
   /// What a perfect planar scanner all round would see, 0 ... 32 m, at the stamp of a frame.
   struct PerfectScan {
-    std::size_t frame = 0;             ///< taken at this frame's stamp
-    std::vector<std::uint16_t> range;  ///< rays from -pi on, in steps; nearest thing at any height of the slice
+    std::size_t frame = 0;  ///< taken at this frame's stamp
+    std::vector<std::uint16_t>
+        range;  ///< rays from -pi on, in steps; nearest thing at any height of the slice
   };
 
   Pose2 T_base_camera;

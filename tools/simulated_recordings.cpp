@@ -68,7 +68,8 @@ ProfileRecording simulate(const SimulatedDrive& drive) {
     recording.add_perfect_scan(recording.frames() - 1, nearest);
     return true;
   };
-  TourResult result = run_tour(simulator, load_tour(drive.tour_file), kOdometryRate_hz, drive.limit_s, observer);
+  TourResult result =
+      run_tour(simulator, load_tour(drive.tour_file), kOdometryRate_hz, drive.limit_s, observer);
   recording.odometry = std::move(result.odometry);
   recording.truth = std::move(result.truth);
   return recording;
@@ -76,14 +77,16 @@ ProfileRecording simulate(const SimulatedDrive& drive) {
 
 }  // namespace
 
-SimulatedRecordings::SimulatedRecordings(std::string folder, bool fresh) : folder_(std::move(folder)), fresh_(fresh) {
+SimulatedRecordings::SimulatedRecordings(std::string folder, bool fresh)
+    : folder_(std::move(folder)), fresh_(fresh) {
   std::error_code error;
   fs::create_directories(folder_, error);
   if (error) throw UserError(fmt::format("--cache: cannot make {}: {}.", folder_, error.message()));
 }
 
 std::string SimulatedRecordings::path_of(const SimulatedDrive& drive) const {
-  std::string decides = fmt::format("{} {} {} {} {} ", kGeneration, drive.sensor, drive.odometry, drive.seed, drive.limit_s);
+  std::string decides =
+      fmt::format("{} {} {} {} {} ", kGeneration, drive.sensor, drive.odometry, drive.seed, drive.limit_s);
   decides += world_text(drive.world_file) + read_text_file(drive.tour_file);
   ConfigDescriber describer;
   FrontEndConfig front_end = drive.front_end;
@@ -91,12 +94,15 @@ std::string SimulatedRecordings::path_of(const SimulatedDrive& drive) const {
   for (const ParameterDescription& p : describer.parameters) decides += p.name + "=" + p.default_value + "\n";
   const std::string& calibration = drive.front_end.depth_correction.calibration_file;
   if (!calibration.empty()) decides += read_text_file(calibration);
-  return (fs::path(folder_) / fmt::format("{}-{}-{}-{:016x}.profiles", fs::path(drive.world_file).stem().string(),
-                                          drive.sensor, drive.seed, std::hash<std::string>{}(decides)))
+  return (fs::path(folder_) / fmt::format("{}-{}-{}-{:016x}.profiles",
+                                          fs::path(drive.world_file).stem().string(), drive.sensor,
+                                          drive.seed, std::hash<std::string>{}(decides)))
       .string();
 }
 
-bool SimulatedRecordings::have(const SimulatedDrive& drive) const { return !fresh_ && fs::exists(path_of(drive)); }
+bool SimulatedRecordings::have(const SimulatedDrive& drive) const {
+  return !fresh_ && fs::exists(path_of(drive));
+}
 
 ProfileRecording SimulatedRecordings::get(const SimulatedDrive& drive) {
   const std::string path = path_of(drive);

@@ -16,16 +16,16 @@ struct SimulatedDrive {
   FrontEndConfig front_end;
 };
 
-/// Recordings of simulated drives in a folder: simulating a minute of depth frames takes longer than a minute of
-/// mapping by two orders, so it is done once per drive.
+/// Recordings of simulated drives in a folder: simulating a minute of depth frames takes longer than a minute
+/// of mapping by two orders, so it is done once per drive.
 class SimulatedRecordings {
  public:
   /// @param folder   made if it does not exist
   /// @param fresh    simulate even what is there
   SimulatedRecordings(std::string folder, bool fresh);
 
-  /// From the folder, or simulated now. A drive that differs in anything (world, tour, seed, presets, front end's
-  /// parameters) has a file of its own.
+  /// From the folder, or simulated now. A drive that differs in anything (world, tour, seed, presets, front
+  /// end's parameters) has a file of its own.
   ProfileRecording get(const SimulatedDrive& drive);
   std::string path_of(const SimulatedDrive& drive) const;
   bool have(const SimulatedDrive& drive) const;

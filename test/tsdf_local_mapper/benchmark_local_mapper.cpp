@@ -7,8 +7,8 @@
 namespace knav {
 namespace {
 
-/// Frames of a robot that goes round in a furnished room, simulated beforehand. A short window, so that every frame
-/// also leaves it.
+/// Frames of a robot that goes round in a furnished room, simulated beforehand. A short window, so that every
+/// frame also leaves it.
 void whole_step(benchmark::State& state) {
   const RoomWorld world = RoomWorld::furnished();
   LocalMapperConfig config;
