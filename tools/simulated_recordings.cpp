@@ -19,11 +19,17 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Raised whenever simulator or front end come to give other profiles from the same parameters.
-constexpr int kGeneration = 1;
+constexpr int kGeneration = 2;
 constexpr double kOdometryRate_hz = 50.0;
 constexpr std::uint64_t kFramesPerPerfectScan = 30;
-/// A scanner at each of these heights together sees what stands in the slice that the profile takes.
-constexpr double kSliceHeights_m[] = {0.045, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.74, 0.9, 1.2, 1.5, 1.95};
+
+/// Scanners at these heights together see what stands in the slice that the profile takes, table tops of 3 cm included.
+std::vector<double> slice_heights_m() {
+  std::vector<double> heights;
+  for (double height_m = 0.045; height_m < 1.0; height_m += 0.025) heights.push_back(height_m);
+  for (double height_m = 1.1; height_m < 2.0; height_m += 0.2) heights.push_back(height_m);
+  return heights;
+}
 
 /// A world file and the files it starts from.
 std::string world_text(const std::string& path) {
@@ -50,6 +56,7 @@ ProfileRecording simulate(const SimulatedDrive& drive) {
   DepthProfile profile;
   RangeScan scan;
   std::vector<float> nearest;
+  const std::vector<double> heights_m = slice_heights_m();
   TourObserver observer;
   observer.odometry = [&] { odometry.add(simulator.stamp_s(), simulator.T_odom_base()); };
   observer.frame = [&](const FrameRequest& request) {
@@ -60,7 +67,7 @@ ProfileRecording simulate(const SimulatedDrive& drive) {
     recording.add(profile);
     if (request.index % kFramesPerPerfectScan != 0) return true;
     nearest.clear();
-    for (const double height_m : kSliceHeights_m) {
+    for (const double height_m : heights_m) {
       simulator.scan_perfect(request, height_m, &scan);
       if (nearest.empty()) nearest = scan.range_m;
       for (std::size_t i = 0; i < nearest.size(); ++i) nearest[i] = std::min(nearest[i], scan.range_m[i]);
