@@ -17,7 +17,7 @@ struct TruncationConfig {
   double per_range_squared = 0.003;
   double limit_m = 2.0;
   double behind_full = 0.3;
-  int behind_power = 2;
+  int behind_power = 4;
 
   template <class Visitor>
   void visit(Visitor& v) {
