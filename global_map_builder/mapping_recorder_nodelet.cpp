@@ -1,6 +1,6 @@
-// Records what build_map needs while the robot is driven around, with the first seconds of raw depth. As a nodelet
-// beside the camera it gets the images as pointers: 18 MB a second less to serialise than a recorder of its own.
-#include <pluginlib/class_list_macros.hpp>
+// Records what build_map needs while the robot is driven around, with the first seconds of raw depth. As a
+// nodelet beside the camera it gets the images as pointers: 18 MB a second less to serialise than a recorder
+// of its own.
 #include <ros/ros.h>
 #include <rosbag/bag.h>
 #include <sensor_msgs/Image.h>
@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <memory>
 #include <mutex>
+#include <pluginlib/class_list_macros.hpp>
 #include <string>
 #include <vector>
 
@@ -36,15 +37,17 @@ class MappingRecorderNodelet : public NodeletBase {
       throw UserError(config_.bag + ": cannot be written (" + error.what() + ").");
     }
     open_ = true;
-    for (const char* topic : {"depth_profile", "odom", "/tf", "mark_place", "ground_truth", "joy",
-                              "camera/depth/camera_info"}) {
+    for (const char* topic :
+         {"depth_profile", "odom", "/tf", "mark_place", "ground_truth", "joy", "camera/depth/camera_info"}) {
       subscribe<topic_tools::ShapeShifter>(topic);
     }
     // By its type: a latched message of this very process does not reach a ShapeShifter.
-    subscribe<tf2_msgs::TFMessage>("/tf_static");
+    static_tf_subscriber_ = getNodeHandle().subscribe<tf2_msgs::TFMessage>(
+        "/tf_static", 100, [this](const tf2_msgs::TFMessageConstPtr& message) { add_static(*message); });
     if (config_.depth_s > 0.0) {
       depth_subscriber_ = getNodeHandle().subscribe<sensor_msgs::Image>(
-          "camera/depth/image_raw", 60, [this](const sensor_msgs::ImageConstPtr& image) { add_depth(image); });
+          "camera/depth/image_raw", 60,
+          [this](const sensor_msgs::ImageConstPtr& image) { add_depth(image); });
     }
     NODELET_INFO("Recording to %s.", config_.bag.c_str());
   }
@@ -59,6 +62,25 @@ class MappingRecorderNodelet : public NodeletBase {
         })));
   }
 
+  /// Latched, so it often comes before simulated time has begun: it is kept until there is a time to write it
+  /// at.
+  void add_static(const tf2_msgs::TFMessage& message) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      early_.push_back(message);
+    }
+    if (!ros::Time::now().isZero()) write_early(ros::Time::now());
+  }
+
+  void write_early(ros::Time time) {
+    std::vector<tf2_msgs::TFMessage> messages;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      messages.swap(early_);
+    }
+    for (const tf2_msgs::TFMessage& message : messages) write("/tf_static", time, message, nullptr);
+  }
+
   void add_depth(const sensor_msgs::ImageConstPtr& image) {
     if (first_depth_.isZero()) first_depth_ = image->header.stamp;
     if ((image->header.stamp - first_depth_).toSec() > config_.depth_s) {
@@ -71,12 +93,15 @@ class MappingRecorderNodelet : public NodeletBase {
   template <class Message>
   void write(const std::string& topic, ros::Time time, const Message& message,
              const boost::shared_ptr<ros::M_string>& connection_header) {
-    std::lock_guard<std::mutex> lock(mutex_);
-    if (!open_ || time.isZero()) return;
+    if (time.isZero()) return;
+    if (topic != "/tf_static") write_early(time);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!open_) return;
     try {
       bag_.write(topic, time, message, connection_header);
     } catch (const rosbag::BagException& error) {
-      NODELET_FATAL("Recording stopped: %s: %s. What was written is kept.", config_.bag.c_str(), error.what());
+      NODELET_FATAL("Recording stopped: %s: %s. What was written is kept.", config_.bag.c_str(),
+                    error.what());
       close();
     }
   }
@@ -100,7 +125,8 @@ class MappingRecorderNodelet : public NodeletBase {
   bool open_ = false;
   std::string part_;
   ros::Time first_depth_;
-  ros::Subscriber depth_subscriber_;
+  std::vector<tf2_msgs::TFMessage> early_;  ///< static transforms from before the first stamp
+  ros::Subscriber depth_subscriber_, static_tf_subscriber_;
   std::vector<ros::Subscriber> subscribers_;
 };
 
