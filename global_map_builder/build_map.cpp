@@ -3,6 +3,8 @@
 #include <sys/resource.h>
 
 #include <chrono>
+#include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "core/config.h"
@@ -11,8 +13,9 @@
 #include "core/progress.h"
 #include "depth_profile_nodelet/front_end.h"
 #include "global_map_builder/build_map_config.h"
+#include "global_map_builder/closure_list.h"
 #include "global_map_builder/map_builder.h"
-#include "global_map_builder/map_picture.h"
+#include "global_map_builder/map_writer.h"
 #include "ros_common/command_line.h"
 
 namespace knav {
@@ -21,17 +24,22 @@ namespace {
 using Json = nlohmann::json;
 
 const char* const kFooter =
-    R"(DIR receives map.yaml, map.pgm (map_server's format), distance.tiff (float32 m, signed, NaN unknown), keepout.pgm,
-places.yaml, trajectory.tum, graph.g2o, closures.json, map.png and metadata.yaml.
-The JSON of --json holds source, observations (count), frames_used, path_m, keyframes, marks, breaks (times the mapper
-lost the thread), mended_steps (its jumps, mended), closures {found, accepted, button, automatic}, graph {chi2, iterations}, map {width_m, height_m,
-contour_m, checksum}, time_s {read, refinement, closures, surface, distance, total}, recording_s, memory_mb, seed.
-closures.json holds, for each, from_stamp_s, to_stamp_s, source, matched, accepted, reason, x_m, y_m, yaw_rad (of the
-later pose in the earlier), score, overlap, agreement, residual_m, rival, chi2.)";
+    R"(Several bags: parts of one drive, in order, are put together; a bag that begins elsewhere or at another time is a
+drive of its own and is found in the others, wherever it began.
+DIR receives map.yaml, map.pgm (map_server's format), distance.tiff (float32 m, signed, NaN unknown), keepout.pgm,
+places.yaml, trajectory.tum, graph.g2o, closures.json, closures.yaml (the allow / deny list), report.html, map.png,
+drives.bin (what --extend needs), changes.json (with --extend) and metadata.yaml.
+The JSON of --json holds source, observations (count), frames_used, drives, path_m, keyframes, marks, breaks (times the
+mapper lost the thread), mended_steps (its jumps, mended), closures {found, accepted, button, automatic, located,
+list}, graph {chi2, edges}, map {width_m, height_m, contour_m, checksum}, changes (count), time_s {read, refinement,
+closures, surface, distance, write, total}, recording_s, memory_mb, seed.
+closures.json holds, for each, from_drive, to_drive, from_stamp_s, to_stamp_s, source, verdict (of the list), matched,
+accepted, reason, x_m, y_m, yaw_rad (of the later pose in the earlier), score, overlap, agreement, residual_m, rival,
+chi2. changes.json holds, for each area, now (occupied or free), x_m, y_m (its middle), width_m, height_m, wall_m.)";
 
 struct Options {
   std::vector<std::string> bags;
-  std::string out, config, from, json;
+  std::string out, config, from, json, list, extend;
   int seed = -1;
   bool force = false;
 };
@@ -69,52 +77,59 @@ double peak_memory_mb() {
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
-Json closures_json(const BuiltMap& built, const DriveRecorder& drive) {
-  Json list = Json::array();
-  for (const Closure& c : built.closures) {
-    list.push_back({{"from_stamp_s", drive.keyframes()[static_cast<std::size_t>(c.from)].stamp_s},
-                    {"to_stamp_s", drive.keyframes()[static_cast<std::size_t>(c.to)].stamp_s},
-                    {"from", c.from},
-                    {"to", c.to},
-                    {"source", c.source},
-                    {"matched", c.matched},
-                    {"accepted", c.accepted},
-                    {"reason", c.reason},
-                    {"x_m", c.match.T_from_to.x_m},
-                    {"y_m", c.match.T_from_to.y_m},
-                    {"yaw_rad", c.match.T_from_to.yaw_rad},
-                    {"score", c.match.score},
-                    {"overlap", c.match.overlap},
-                    {"agreement", c.match.agreement},
-                    {"residual_m", c.match.residual_m},
-                    {"rival", c.match.rival},
-                    {"chi2", c.chi2}});
-  }
-  return list;
-}
-
 struct Read {
   std::string source;
   std::size_t observations = 0, marks = 0;
-  double first_s = 0.0, last_s = 0.0;
+  int drives = 0;
+  double recording_s = 0.0;
+};
+
+/// Tells whether a bag goes on with the drive that the last one ended in, from clock and odometry.
+class DriveEnd {
+ public:
+  void add(double stamp_s, const Pose2& T_odom_base) {
+    stamp_s_ = stamp_s;
+    T_odom_base_ = T_odom_base;
+  }
+  bool continued_by(double stamp_s, const Pose2& T_odom_base) const {
+    constexpr double kPause_s = 30.0, kSpeed_mps = 1.5, kTurn_radps = 2.5, kSlack = 0.1;
+    const double pause_s = stamp_s - stamp_s_;
+    return pause_s >= 0.0 && pause_s < kPause_s &&
+           distance_m(T_odom_base, T_odom_base_) < kSlack + kSpeed_mps * pause_s &&
+           std::fabs(normalize_angle_rad(T_odom_base.yaw_rad - T_odom_base_.yaw_rad)) < kSlack + kTurn_radps * pause_s;
+  }
+
+ private:
+  double stamp_s_ = 1e300;
+  Pose2 T_odom_base_;
 };
 
 Read read_bags(const Options& options, const ObservationReaderConfig& config, const FrontEndConfig& front_end,
                MapBuilder* builder, Stages* stages) {
   Read read;
+  DriveEnd end;
   for (std::size_t i = 0; i < options.bags.size(); ++i) {
     ObservationReader reader(options.bags[i], config, front_end);
+    bool first = true;
     ObservationCallbacks callbacks;
-    callbacks.add_odometry = [&](double stamp_s, const Pose2& T) { builder->add_odometry(stamp_s, T); };
+    callbacks.add_odometry = [&](double stamp_s, const Pose2& T) {
+      if (first && !end.continued_by(stamp_s, T)) {
+        builder->begin_drive(options.bags[i]);
+        ++read.drives;
+      }
+      first = false;
+      end.add(stamp_s, T);
+      builder->add_odometry(stamp_s, T);
+    };
     callbacks.profile = [&](const DepthProfile& profile, const Pose2& T) { builder->add(profile, T); };
     callbacks.scan = [&](const RangeScan& scan, const Pose2& T) { builder->add(scan, T); };
     callbacks.mark = [&](double stamp_s) { builder->mark(stamp_s); };
     callbacks.progress = [&](double fraction) {
-      const auto& poses = builder->drive().keyframes();
+      const Drive& drive = builder->drive();
       stages->update("trajectory",
                      (static_cast<double>(i) + fraction) / static_cast<double>(options.bags.size()),
-                     fmt::format("{} frames, {:.0f} m", builder->drive().trajectory().size(),
-                                 poses.empty() ? 0.0 : poses.back().path_m));
+                     fmt::format("{} frames, {:.0f} m", drive.trajectory.size(),
+                                 drive.keyframes.empty() ? 0.0 : drive.keyframes.back().path_m));
     };
     reader.read(callbacks);
     stages->finish();
@@ -125,18 +140,38 @@ Read read_bags(const Options& options, const ObservationReaderConfig& config, co
     }
     if (statistics.odometry == 0)
       throw UserError(options.bags[i] + ": its odometry holds no usable message.");
-    if (read.observations > 0 && statistics.first_stamp_s < read.last_s) {
-      throw UserError(
-          fmt::format("{}: begins before {} ends; several bags must be parts of one drive, in order.",
-                      options.bags[i], options.bags[i - 1]));
-    }
-    if (read.observations == 0) read.first_s = statistics.first_stamp_s;
-    read.last_s = statistics.last_stamp_s;
+    read.recording_s += statistics.last_stamp_s - statistics.first_stamp_s;
     read.source = reader.source();
     read.observations += statistics.observations;
     read.marks += statistics.marks;
   }
   return read;
+}
+
+/// The map to add to.
+void load_old(const std::string& directory, const BuildMapConfig& config, MapBuilder* builder) {
+  if (!is_map_directory(directory)) throw UserError(directory + ": is not a map directory.");
+  MapDirectory map = load_map(directory);
+  for (const std::string& warning : map.warnings) fmt::print(stderr, "build_map: {}\n", warning);
+  if (map.occupancy.geometry.resolution_m != config.surface.resolution_m) {
+    throw UserError(fmt::format("{}: has cells of {} m, but map_builder/surface/resolution_m is {}; they must be equal.",
+                                directory, map.occupancy.geometry.resolution_m, config.surface.resolution_m));
+  }
+  const std::string file = directory + "/drives.bin";
+  if (!std::filesystem::exists(file)) {
+    throw UserError(directory + ": has no drives.bin, so it cannot be extended; build it anew from its recordings.");
+  }
+  builder->extend(read_map_record(file), std::move(map));
+}
+
+void print_changes(const std::vector<MapChange>& changes) {
+  constexpr std::size_t kShown = 10;
+  fmt::print(stderr, "{} areas changed{}\n", changes.size(), changes.size() > kShown ? ", the largest:" : "");
+  for (std::size_t i = 0; i < std::min(kShown, changes.size()); ++i) {
+    const MapChange& c = changes[i];
+    fmt::print(stderr, "  now {}: {:.1f} x {:.1f} m at ({:.2f}, {:.2f})\n", c.occupied ? "occupied" : "free", c.width_m,
+               c.height_m, c.x_m, c.y_m);
+  }
 }
 
 void build_map(const Options& options) {
@@ -148,80 +183,52 @@ void build_map(const Options& options) {
   const FrontEndConfig front_end = FrontEndConfig::from_file(options.config);
 
   MapBuilder builder(config, mapper);
+  const std::string out = options.out.empty() ? options.extend : options.out;
+  if (out.empty()) throw UserError("--out is required; only --extend can do without, and then replaces the old map.");
+  if (!options.list.empty()) builder.set_list(read_closure_list(options.list));
+  if (!options.extend.empty()) load_old(options.extend, config, &builder);
   Stages stages;
   const Read read = read_bags(options, config.recording, front_end, &builder, &stages);
   const double read_s = seconds_since(start);
-  BuiltMap built;
-  try {
-    built = builder.build([&](const char* stage, double fraction) { stages.update(stage, fraction); });
-  } catch (const UserError& error) {
-    throw UserError(options.bags.front() + ": " + error.what());
-  }
+  BuiltMap built = builder.build([&](const char* stage, double fraction) { stages.update(stage, fraction); });
   stages.finish();
 
-  const DriveRecorder& drive = builder.drive();
-  std::size_t accepted = 0, by_button = 0;
-  for (const Closure& c : built.closures) {
-    accepted += c.accepted;
-    by_button += c.accepted && c.source == "button";
-  }
-  double contour_m = 0.0;
-  for (const ContourSegment& s : built.contour) contour_m += std::hypot(s.a.x_m - s.b.x_m, s.a.y_m - s.b.y_m);
+  Json json = figures_of(built);
+  json["source"] = read.source;
+  json["observations"] = read.observations;
+  json["marks"] = read.marks;
+  json["recording_s"] = read.recording_s;
+  json["seed"] = mapper.seed;
+  built.map.about["made_by"] = "build_map";
+  const auto write_start = std::chrono::steady_clock::now();
+  stages.update("writing", 0.0);
+  // An extended map carries keepout and places over, so that nothing drawn by hand is lost.
+  const bool in_place = !options.extend.empty() && std::filesystem::exists(out) &&
+                        std::filesystem::equivalent(options.extend, out);
+  write_built_map(out, json, options.force || in_place, &built);
+  stages.finish();
 
-  built.map.about = {{"made_by", "build_map"},
-                     {"bags", fmt::format("{}", fmt::join(options.bags, ", "))},
-                     {"source", read.source},
-                     {"seed", std::to_string(mapper.seed)},
-                     {"path_m", fmt::format("{:.1f}", drive.keyframes().back().path_m)},
-                     {"closures_accepted", std::to_string(accepted)}};
-  built.map.checksum = save_map(options.out, built.map, options.force, [&](const std::string& folder) {
-    write_pose_graph(folder + "/graph.g2o", built.graph);
-    write_text_atomically(folder + "/closures.json", closures_json(built, drive).dump(1) + "\n");
-    write_map_picture(folder + "/map.png", built);
-  });
-
-  const GridGeometry& g = built.map.occupancy.geometry;
   const double total_s = seconds_since(start);
-  const Json json = {{"source", read.source},
-                     {"observations", read.observations},
-                     {"frames_used", drive.frames().size()},
-                     {"path_m", drive.keyframes().back().path_m},
-                     {"keyframes", drive.keyframes().size()},
-                     {"marks", read.marks},
-                     {"breaks", drive.breaks()},
-                     {"mended_steps", built.mended_steps},
-                     {"closures",
-                      {{"found", built.closures.size()},
-                       {"accepted", accepted},
-                       {"button", by_button},
-                       {"automatic", accepted - by_button}}},
-                     {"graph", {{"chi2", chi2(built.graph)}, {"edges", built.graph.edges.size()}}},
-                     {"map",
-                      {{"width_m", g.width_cells * g.resolution_m},
-                       {"height_m", g.height_cells * g.resolution_m},
-                       {"contour_m", contour_m},
-                       {"checksum", built.map.checksum}}},
-                     {"time_s",
-                      {{"read", read_s},
-                       {"refinement", built.stage_s["refinement"]},
-                       {"closures", built.stage_s["closures"]},
-                       {"surface", built.stage_s["surface"]},
-                       {"distance", built.stage_s["distance"]},
-                       {"total", total_s}}},
-                     {"recording_s", read.last_s - read.first_s},
-                     {"memory_mb", peak_memory_mb()},
-                     {"seed", mapper.seed}};
+  json["map"]["checksum"] = built.map.checksum;
+  json["time_s"] = {{"read", read_s},
+                    {"refinement", built.stage_s["refinement"]},
+                    {"closures", built.stage_s["closures"]},
+                    {"surface", built.stage_s["surface"]},
+                    {"distance", built.stage_s["distance"]},
+                    {"write", seconds_since(write_start)},
+                    {"total", total_s}};
+  json["memory_mb"] = peak_memory_mb();
   write_json(options.json, json.dump(2));
-  if (drive.breaks() > 0) {
+  const int breaks = json["breaks"];
+  if (breaks > 0) {
     fmt::print(stderr,
-               "build_map: the local mapper lost the thread {} times; the map hangs on odometry there.\n",
-               drive.breaks());
+               "build_map: the local mapper lost the thread {} times; the map hangs on odometry there.\n", breaks);
   }
+  if (built.old_drives > 0) print_changes(built.changes);
   fmt::print(stderr,
-             "{}: {:.1f} x {:.1f} m, {:.0f} m driven, {} of {} closures, {:.0f} s of recording in {:.1f} s\n",
-             options.out, g.width_cells * g.resolution_m, g.height_cells * g.resolution_m,
-             drive.keyframes().back().path_m, accepted, built.closures.size(), read.last_s - read.first_s,
-             total_s);
+             "{}: {:.1f} x {:.1f} m, {:.0f} m driven, {} of {} closures, {:.0f} s of recording in {:.1f} s\n", out,
+             json["map"]["width_m"].get<double>(), json["map"]["height_m"].get<double>(), json["path_m"].get<double>(),
+             json["closures"]["accepted"].get<int>(), json["closures"]["found"].get<int>(), read.recording_s, total_s);
 }
 
 }  // namespace
@@ -233,9 +240,12 @@ int main(int argc, char** argv) {
       "odometry,\n"
       "TF and button marks. The same bag, configuration and seed give the same map.");
   knav::Options options;
-  app.add_option("BAG", options.bags, "recording; several are the parts of one drive, in order")->required();
-  app.add_option("--out", options.out, "map directory to write; an older map there is replaced as a whole")
-      ->required();
+  app.add_option("BAG", options.bags, "recording; several: parts of a drive, or several drives of one building")->required();
+  app.add_option("--out", options.out, "map directory to write; an older map there is replaced as a whole");
+  app.add_option("--extend", options.extend,
+                 "map directory to add the drives to, in its frame; replaced if there is no --out");
+  app.add_option("--closures", options.list,
+                 "allow / deny list: an edited closures.yaml, as lies in a map directory or report.html saves");
   app.add_option("--config", options.config,
                  "configuration file, as config/default.yaml (sections map_builder, local_mapper)");
   app.add_option("--from", options.from, "what to build from; auto takes what the bag has")

@@ -6,87 +6,96 @@
 #include <cmath>
 #include <queue>
 
+#include "core/random.h"
+
 namespace knav {
 namespace {
 
-constexpr double kSubmapFrameDistance_m = 0.1;
-constexpr double kSubmapFrameAngle_rad = 0.07;
-constexpr std::size_t kSubmapFrames = 400;
+constexpr std::size_t kPicturePoints = 600;  // of each local map, kept for the report
+
+std::vector<SurfacePoint> thinned(const std::vector<SurfacePoint>& points) {
+  std::vector<SurfacePoint> out;
+  const std::size_t stride = points.size() / kPicturePoints + 1;
+  for (std::size_t i = 0; i < points.size(); i += stride) out.push_back(points[i]);
+  return out;
+}
 
 }  // namespace
 
-std::vector<TsdfObservation> observations_near(const DriveRecorder& drive, int keyframe, double half_length_m,
-                                               const ObservationLimits& limits) {
-  const std::vector<Keyframe>& keyframes = drive.keyframes();
-  const auto index = static_cast<std::size_t>(keyframe);
-  // Not across a break of the mapper's epoch.
-  std::size_t first = index, last = index;
-  while (first > 0 && !keyframes[first].after_break &&
-         keyframes[index].path_m - keyframes[first - 1].path_m <= half_length_m) {
-    --first;
+DriveSet::DriveSet(const std::vector<Drive>& drives) : drives_(drives), first_{0} {
+  double before_m = 0.0;
+  for (const Drive& drive : drives) {
+    first_.push_back(first_.back() + static_cast<int>(drive.keyframes.size()));
+    path_before_m_.push_back(before_m);
+    before_m += drive.keyframes.empty() ? 0.0 : drive.keyframes.back().path_m;
   }
-  while (last + 1 < keyframes.size() && !keyframes[last + 1].after_break &&
-         keyframes[last + 1].path_m - keyframes[index].path_m <= half_length_m) {
-    ++last;
-  }
-  const double end_s = last + 1 < keyframes.size() ? keyframes[last + 1].stamp_s : 1e300;
-  const Pose2 T_keyframe_drive = keyframes[index].T_drive_base.inverse();
-  const auto& frames = drive.frames();
-  const auto before = [](const DriveFrame& frame, double stamp_s) { return frame.stamp_s < stamp_s; };
-  auto frame = std::lower_bound(frames.begin(), frames.end(), keyframes[first].stamp_s, before);
-  std::vector<TsdfObservation> observations;
-  const Pose2* taken = nullptr;
-  for (; frame != frames.end() && frame->stamp_s < end_s && observations.size() < kSubmapFrames; ++frame) {
-    if (taken != nullptr && distance_m(*taken, frame->T_drive_base) < kSubmapFrameDistance_m &&
-        std::fabs(normalize_angle_rad(taken->yaw_rad - frame->T_drive_base.yaw_rad)) <
-            kSubmapFrameAngle_rad) {
-      continue;
-    }
-    taken = &frame->T_drive_base;
-    TsdfObservation& observation = observations.emplace_back();
-    std::visit([&](const auto& data) { observation_from(data, limits, &observation); }, frame->data);
-    observation.T_map_sensor = T_keyframe_drive * frame->T_drive_base * frame->T_base_sensor;
-  }
-  return observations;
 }
 
-ClosureFinder::ClosureFinder(const MapBuilderConfig& config, const DriveRecorder& drive)
-    : config_(config), drive_(drive) {
-  for (std::size_t i = 0; i < drive.keyframes().size(); ++i) {
-    graph_.nodes[static_cast<int>(i)] = drive.keyframes()[i].T_drive_base;
+int DriveSet::drive_of(int node) const {
+  return static_cast<int>(std::upper_bound(first_.begin(), first_.end(), node) - first_.begin()) - 1;
+}
+
+ClosureFinder::ClosureFinder(const MapBuilderConfig& config, const DriveSet& set) : config_(config), set_(set) {
+  for (int node = 0; node < set.nodes(); ++node) graph_.nodes[node] = set.keyframe(node).T_drive_base;
+  for (int drive = 0; drive < set.count(); ++drive) {
+    for (PoseGraphEdge edge : set.drives()[static_cast<std::size_t>(drive)].edges) {
+      edge.from += set.first(drive);
+      edge.to += set.first(drive);
+      graph_.edges.push_back(edge);
+    }
   }
-  graph_.edges = drive.edges();
+}
+
+void ClosureFinder::hold(const std::vector<Pose2>& T_map_keyframe, const std::vector<Closure>& closures) {
+  held_ = static_cast<int>(T_map_keyframe.size());
+  for (int node = 0; node < held_; ++node) {
+    graph_.nodes[node] = T_map_keyframe[static_cast<std::size_t>(node)];
+    graph_.held.insert(node);
+  }
+  for (const Closure& closure : closures) {
+    if (closure.accepted) {
+      graph_.edges.push_back({closure.from, closure.to, closure.match.T_from_to, closure.match.information, true});
+    }
+    closures_.push_back(closure);
+  }
+}
+
+void ClosureFinder::make_submap(int keyframe) {
+  SurfaceConfig surface = config_.surface;
+  surface.range_max_m = std::min(surface.range_max_m, config_.closures.submap_range_max_m);
+  surface.min_looks = 2;
+  submaps_.at(keyframe) = std::make_unique<Submap>(
+      surface, observations_near(set_.drive(keyframe), keyframe - set_.first(set_.drive_of(keyframe)),
+                                 config_.closures.submap_half_length_m, surface.limits()));
 }
 
 const Submap& ClosureFinder::submap(int keyframe) {
-  std::unique_ptr<Submap>& entry = submaps_[keyframe];
-  if (!entry) {
-    SurfaceConfig surface = config_.surface;
-    surface.range_max_m = std::min(surface.range_max_m, config_.closures.submap_range_max_m);
-    surface.min_looks = 2;
-    entry = std::make_unique<Submap>(
-        surface,
-        observations_near(drive_, keyframe, config_.closures.submap_half_length_m, surface.limits()));
-  }
-  return *entry;
+  if (submaps_.try_emplace(keyframe).second || !submaps_.at(keyframe)) make_submap(keyframe);
+  return *submaps_.at(keyframe);
 }
 
-/// The shortest way between two keyframes along the drive and over the closures accepted so far: what error
+/// The shortest way between two keyframes along the drives and over the closures accepted so far: what error
 /// can have gathered between them.
 double ClosureFinder::drift_path_m(int from, int to) const {
-  const auto& keyframes = drive_.keyframes();
-  std::vector<std::vector<int>> jumps(keyframes.size());
+  const auto nodes = static_cast<std::size_t>(set_.nodes());
+  std::vector<std::vector<int>> jumps(nodes);
   for (const Closure& closure : closures_) {
     if (!closure.accepted) continue;
     jumps[static_cast<std::size_t>(closure.from)].push_back(closure.to);
     jumps[static_cast<std::size_t>(closure.to)].push_back(closure.from);
   }
-  std::vector<double> best(keyframes.size(), 1e300);
+  std::vector<double> best(nodes, 1e300);
   using Entry = std::pair<double, int>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> open;
   const auto reach = [&](int node, double length) {
     double& known = best[static_cast<std::size_t>(node)];
     if (length < known) open.emplace(known = length, node);
+  };
+  const auto step = [&](int node, int next, double length) {
+    if (next < 0 || next >= set_.nodes() || set_.drive_of(node) != set_.drive_of(next)) return;
+    // What is held is known: no drift gathers along it.
+    const double way = held(node) && held(next) ? 0.0 : std::fabs(path_m(node) - path_m(next));
+    reach(next, length + way);
   };
   reach(from, 0.0);
   while (!open.empty()) {
@@ -95,11 +104,11 @@ double ClosureFinder::drift_path_m(int from, int to) const {
     const auto i = static_cast<std::size_t>(node);
     if (node == to) return length;
     if (length > best[i]) continue;
-    if (i > 0) reach(node - 1, length + keyframes[i].path_m - keyframes[i - 1].path_m);
-    if (i + 1 < keyframes.size()) reach(node + 1, length + keyframes[i + 1].path_m - keyframes[i].path_m);
+    step(node, node - 1, length);
+    step(node, node + 1, length);
     for (const int other : jumps[i]) reach(other, length);
   }
-  return keyframes.back().path_m;
+  return path_m(set_.nodes() - 1);
 }
 
 MatchWindow ClosureFinder::window_for(double path_m) const {
@@ -113,10 +122,9 @@ MatchWindow ClosureFinder::window_for(double path_m) const {
 }
 
 /// Of every earlier pass by this place, the keyframe that was nearest.
-std::vector<int> ClosureFinder::earlier_visits(int keyframe) const {
-  const auto& keyframes = drive_.keyframes();
+std::vector<int> ClosureFinder::earlier_visits(int keyframe, int lowest) const {
   const Pose2& here = graph_.nodes.at(keyframe);
-  const double path_m = keyframes[static_cast<std::size_t>(keyframe)].path_m;
+  const double here_path_m = path_m(keyframe);
   std::vector<int> visits;
   int nearest = -1;
   double nearest_distance = 0.0, left_at_path = 0.0;
@@ -124,11 +132,11 @@ std::vector<int> ClosureFinder::earlier_visits(int keyframe) const {
     if (nearest >= 0) visits.push_back(nearest);
     nearest = -1;
   };
-  for (int other = 0; other < keyframe; ++other) {
-    const double other_path = keyframes[static_cast<std::size_t>(other)].path_m;
-    if (path_m - other_path < config_.closures.min_path_m) break;
+  for (int other = lowest; other < keyframe; ++other) {
+    const double other_path = path_m(other);
+    if (here_path_m - other_path < config_.closures.min_path_m) break;
     const double distance = distance_m(here, graph_.nodes.at(other));
-    const double limit = config_.closures.nearest_m + window_for(path_m - other_path).radius_m;
+    const double limit = config_.closures.nearest_m + window_for(here_path_m - other_path).radius_m;
     if (distance > limit) continue;
     if (nearest >= 0 && other_path - left_at_path > config_.closures.nearest_m) finish();
     if (nearest < 0 || distance < nearest_distance) {
@@ -137,8 +145,7 @@ std::vector<int> ClosureFinder::earlier_visits(int keyframe) const {
     }
     left_at_path = other_path;
     // A long pass in a small place is split, so that no visit hides behind another.
-    if (other_path - keyframes[static_cast<std::size_t>(nearest)].path_m > 2.0 * config_.closures.nearest_m)
-      finish();
+    if (other_path - path_m(nearest) > 2.0 * config_.closures.nearest_m) finish();
   }
   finish();
   return visits;
@@ -150,13 +157,57 @@ bool ClosureFinder::tried(int from, int to, const Pose2& prior) const {
          distance_m(attempt->second.prior, prior) < 0.5 * attempt->second.radius_m;
 }
 
+/// The entry of the list that keeps a closure out: its own, or that of a neighbouring pair with the same mistake.
+const ClosureVerdict* ClosureFinder::denied(const Closure& closure) const {
+  for (const ClosureVerdict& v : verdicts_) {
+    if (v.allow) continue;
+    if (v.from == closure.from && v.to == closure.to) return &v;
+    if (!v.has_transform || set_.drive_of(v.from) != set_.drive_of(closure.from) ||
+        set_.drive_of(v.to) != set_.drive_of(closure.to) ||
+        std::fabs(path_m(v.from) - path_m(closure.from)) > config_.closures.submap_half_length_m ||
+        std::fabs(path_m(v.to) - path_m(closure.to)) > config_.closures.submap_half_length_m) {
+      continue;
+    }
+    const auto along = [&](int a, int b) {
+      return set_.keyframe(a).T_drive_base.inverse() * set_.keyframe(b).T_drive_base;
+    };
+    const Pose2 same = along(closure.from, v.from) * v.T_from_to * along(v.to, closure.to);
+    if (distance_m(same, closure.match.T_from_to) < config_.closures.match.rival_distance_m &&
+        std::fabs(normalize_angle_rad(same.yaw_rad - closure.match.T_from_to.yaw_rad)) <
+            config_.closures.match.rival_angle_deg * kPi / 180.0) {
+      return &v;
+    }
+  }
+  return nullptr;
+}
+
+void ClosureFinder::keep(Closure closure) {
+  closure.from_points = thinned(submap(closure.from).points());
+  closure.to_points = thinned(submap(closure.to).points());
+  closures_.push_back(std::move(closure));
+}
+
 bool ClosureFinder::add(Closure closure, const Pose2& prior) {
+  const bool listed = std::any_of(verdicts_.begin(), verdicts_.end(), [&](const ClosureVerdict& v) {
+    return v.allow && v.from == closure.from && v.to == closure.to;
+  });
+  if (listed) return false;  // allow() has it
   const double path_m = drift_path_m(closure.from, closure.to);
   const MatchWindow window = window_for(path_m);
   attempts_[{closure.from, closure.to}] = {prior, window.radius_m};
   closure.match =
       match_submaps(config_.closures.match, submap(closure.from), submap(closure.to), prior, window);
   closure.matched = closure.match.accepted;
+  if (closure.matched && config_.closures.falsify_share > 0.0) {
+    RandomStream random(config_.closures.falsify_seed, random_stream::kTest, static_cast<std::uint64_t>(closure.from),
+                        static_cast<std::uint64_t>(closure.to));
+    if (random.uniform() < config_.closures.falsify_share) {
+      closure.source = "falsified";
+      closure.match.T_from_to =
+          closure.match.T_from_to *
+          Pose2{random.normal(0.0, 2.0), random.normal(0.0, 2.0), random.normal(0.0, 0.5)};
+    }
+  }
   PoseGraphEdge edge{closure.from, closure.to, closure.match.T_from_to, closure.match.information, true};
   if (!closure.matched) {
     closure.reason = closure.match.reason;
@@ -174,6 +225,13 @@ bool ClosureFinder::add(Closure closure, const Pose2& prior) {
 /// Takes a closure in if the drive can bend so far: the growth of the optimum's chi2 is the closure's squared
 /// distance in standard deviations, given all that is known (its innovation).
 bool ClosureFinder::join(Closure closure, const PoseGraphEdge& edge) {
+  if (const ClosureVerdict* verdict = denied(closure)) {
+    const bool itself = verdict->from == closure.from && verdict->to == closure.to;
+    closure.verdict = itself ? "deny" : "";
+    closure.reason = itself ? "denied by the list" : "the same as one that the list denies";
+    keep(std::move(closure));
+    return false;
+  }
   PoseGraph trial = graph_;
   trial.edges.push_back(edge);
   GraphOptimizerConfig plain = config_.graph;
@@ -188,30 +246,63 @@ bool ClosureFinder::join(Closure closure, const PoseGraphEdge& edge) {
     closure.reason =
         fmt::format("the drive would have to bend too much (chi2 grows by {:.0f})", closure.chi2);
   }
-  closures_.push_back(std::move(closure));
-  return closures_.back().accepted;
+  const bool accepted = closure.accepted;
+  keep(std::move(closure));
+  return accepted;
 }
 
-void ClosureFinder::pair_buttons() {
+/// The list's closures that end in this drive; they are not questioned.
+void ClosureFinder::allow(int drive) {
+  bool any = false, placed = false;
+  for (const ClosureVerdict& v : verdicts_) {
+    if (!v.allow || set_.drive_of(v.to) != drive) continue;
+    if (held(v.from) && held(v.to)) continue;
+    Closure closure;
+    closure.from = v.from;
+    closure.to = v.to;
+    closure.source = "list";
+    closure.verdict = "allow";
+    closure.accepted = true;
+    closure.match = align_submaps(config_.closures.match, submap(v.from), submap(v.to), v.T_from_to);
+    closure.matched = closure.match.accepted;
+    closure.match.T_from_to = v.T_from_to;
+    const double sd_m = config_.closures.allowed_sd_m, sd_rad = config_.closures.allowed_sd_deg * kPi / 180.0;
+    closure.match.information =
+        Eigen::Vector3d(sd_m, sd_m, sd_rad).cwiseAbs2().cwiseInverse().asDiagonal();
+    graph_.edges.push_back({v.from, v.to, v.T_from_to, closure.match.information, false});
+    any = true;
+    if (set_.drive_of(v.from) != drive && !placed) {
+      placed = true;
+      const Pose2 T_map_to = graph_.nodes.at(v.from) * v.T_from_to;
+      move_drive(drive, T_map_to * graph_.nodes.at(v.to).inverse());
+    }
+    keep(std::move(closure));
+  }
+  if (any) optimize_all();
+}
+
+void ClosureFinder::pair_buttons(int drive, int lowest) {
   std::vector<int> marks;
-  for (std::size_t i = 0; i < drive_.keyframes().size(); ++i) {
-    if (drive_.keyframes()[i].marked) marks.push_back(static_cast<int>(i));
+  for (int node = lowest; node < set_.first(drive + 1); ++node) {
+    if (set_.keyframe(node).marked) marks.push_back(node);
   }
   for (std::size_t b = 1; b < marks.size(); ++b) {
+    if (marks[b] < set_.first(drive)) continue;
     // The earlier mark nearest in the estimate, if it can be the same place at all.
     int nearest = -1;
     double nearest_distance = 0.0;
     for (std::size_t a = 0; a < b; ++a) {
-      const double path_m = drive_.keyframes()[static_cast<std::size_t>(marks[b])].path_m -
-                            drive_.keyframes()[static_cast<std::size_t>(marks[a])].path_m;
       const double distance = distance_m(graph_.nodes.at(marks[a]), graph_.nodes.at(marks[b]));
-      if (path_m < 2.0 || distance > window_for(drift_path_m(marks[a], marks[b])).radius_m) continue;
+      if (path_m(marks[b]) - path_m(marks[a]) < 2.0 ||
+          distance > window_for(drift_path_m(marks[a], marks[b])).radius_m) {
+        continue;
+      }
       if (nearest < 0 || distance < nearest_distance) {
         nearest = marks[a];
         nearest_distance = distance;
       }
     }
-    if (nearest < 0) continue;
+    if (nearest < 0 || attempts_.count({nearest, marks[b]}) > 0) continue;
     Closure closure;
     closure.from = nearest;
     closure.to = marks[b];
@@ -220,8 +311,8 @@ void ClosureFinder::pair_buttons() {
   }
 }
 
-void ClosureFinder::search_from(int keyframe) {
-  for (const int visit : earlier_visits(keyframe)) {
+void ClosureFinder::search_from(int keyframe, int lowest) {
+  for (const int visit : earlier_visits(keyframe, lowest)) {
     const Pose2 prior = graph_.nodes.at(visit).inverse() * graph_.nodes.at(keyframe);
     const double radius_m = window_for(drift_path_m(visit, keyframe)).radius_m;
     if (distance_m(prior, {}) > config_.closures.nearest_m + radius_m || tried(visit, keyframe, prior))
@@ -234,6 +325,22 @@ void ClosureFinder::search_from(int keyframe) {
     closure.to = keyframe;
     closure.source = "automatic";
     add(closure, prior);
+  }
+}
+
+void ClosureFinder::search(int drive, int lowest) {
+  const int first = set_.first(drive), last = set_.first(drive + 1);
+  for (int pass = 0; pass < config_.closures.passes; ++pass) {
+    const std::size_t before = closures_.size();
+    double next_path_m = 0.0;
+    for (int node = first; node < last; ++node) {
+      progress_((pass + static_cast<double>(node - first) / (last - first)) / config_.closures.passes);
+      const double here_m = set_.keyframe(node).path_m;
+      if (here_m < next_path_m) continue;
+      next_path_m = here_m + config_.closures.submap_spacing_m;
+      search_from(node, lowest);
+    }
+    if (pass > 0 && closures_.size() == before) break;
   }
 }
 
@@ -251,7 +358,7 @@ void ClosureFinder::settle() {
     double worst = limit;
     for (std::size_t i = 0; i < graph_.edges.size(); ++i) {
       const PoseGraphEdge& e = graph_.edges[i];
-      if (!e.robust) continue;
+      if (!e.robust || (held(e.from) && held(e.to))) continue;
       const double chi2 = edge_chi2(e, graph_.nodes.at(e.from), graph_.nodes.at(e.to));
       if (chi2 > worst) {
         worst = chi2;
@@ -261,7 +368,7 @@ void ClosureFinder::settle() {
     if (worst <= limit) break;
     const PoseGraphEdge bad = graph_.edges[worst_edge];
     for (Closure& closure : closures_) {
-      if (!closure.accepted || closure.from != bad.from || closure.to != bad.to) continue;
+      if (!closure.accepted || closure.verdict == "allow" || closure.from != bad.from || closure.to != bad.to) continue;
       closure.accepted = false;
       closure.chi2 = worst;
       closure.reason = fmt::format("contradicts the rest of the graph (chi2 {:.0f})", worst);
@@ -278,21 +385,18 @@ void ClosureFinder::settle() {
 }
 
 void ClosureFinder::run(const std::function<void(double)>& progress) {
-  if (drive_.keyframes().empty()) return;
-  if (config_.closures.buttons) pair_buttons();
-  if (config_.closures.automatic) {
-    for (int pass = 0; pass < config_.closures.passes; ++pass) {
-      const std::size_t before = closures_.size();
-      double next_path_m = 0.0;
-      for (std::size_t i = 0; i < drive_.keyframes().size(); ++i) {
-        progress((pass + static_cast<double>(i) / static_cast<double>(drive_.keyframes().size())) /
-                 config_.closures.passes);
-        if (drive_.keyframes()[i].path_m < next_path_m) continue;
-        next_path_m = drive_.keyframes()[i].path_m + config_.closures.submap_spacing_m;
-        search_from(static_cast<int>(i));
-      }
-      if (pass > 0 && closures_.size() == before) break;
-    }
+  progress_ = progress;
+  for (int drive = 0; drive < set_.count(); ++drive) {
+    const int first = set_.first(drive);
+    if (set_.first(drive + 1) <= held_ || set_.first(drive + 1) == first) continue;
+    if (config_.closures.buttons) pair_buttons(drive, first);
+    if (drive == 0) allow(drive);
+    if (config_.closures.automatic) search(drive, first);
+    if (drive == 0) continue;
+    allow(drive);
+    locate(drive);
+    if (config_.closures.buttons) pair_buttons(drive, 0);
+    if (config_.closures.automatic) search(drive, 0);
   }
   settle();
 }

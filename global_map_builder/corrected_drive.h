@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "global_map_builder/drive_recorder.h"
+#include "global_map_builder/drive.h"
 
 namespace knav {
 

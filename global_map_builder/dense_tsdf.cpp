@@ -109,6 +109,25 @@ float DenseTsdf::distance_m(std::size_t i) const {
   return known(i) && weight_[i] > 0.0f ? sum_[i] / weight_[i] : std::numeric_limits<float>::quiet_NaN();
 }
 
+void DenseTsdf::renew(const DenseTsdf& later) {
+  const double floor_m = std::max(config_.change_range_m, config_.weight_range_floor_m);
+  const auto enough = static_cast<float>(min_looks_ * std::pow(floor_m, -config_.weight_power));
+  const auto tolerance = static_cast<float>(config_.change_m);
+  for (std::size_t i = 0; i < sum_.size(); ++i) {
+    const float before = distance_m(i), now = later.distance_m(i);
+    if (std::isnan(now)) continue;
+    if (std::isnan(before) || (std::fabs(before - now) > tolerance && later.weight_[i] >= enough)) {
+      sum_[i] = later.sum_[i];
+      weight_[i] = later.weight_[i];
+      looks_[i] = later.looks_[i];
+    } else if (std::fabs(before - now) <= tolerance) {
+      sum_[i] += later.sum_[i];
+      weight_[i] += later.weight_[i];
+      looks_[i] = static_cast<std::uint16_t>(std::min(0xFFFF, looks_[i] + later.looks_[i]));
+    }
+  }
+}
+
 void DenseTsdf::add(const TsdfObservation& o, int first_row, int last_row) {
   if (!(o.reach_m > 0.0f)) return;
   const auto c = static_cast<float>(std::cos(o.T_map_sensor.yaw_rad));

@@ -18,6 +18,8 @@ struct SurfaceConfig {
   double weight_power = 4.0;
   double weight_range_floor_m = 1.0;
   int min_looks = 3;
+  double change_m = 0.15;
+  double change_range_m = 5.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -33,6 +35,10 @@ struct SurfaceConfig {
     v.number("weight_range_floor_m", weight_range_floor_m, 0.1, 10, "m",
              "The floor of the distance in that weight.");
     v.integer("min_looks", min_looks, 1, 1000, "", "A cell seen less often stays unknown.");
+    v.number("change_m", change_m, 0.02, 2, "m",
+             "Where a newer drive puts the surface elsewhere by more than this, it has moved ...");
+    v.number("change_range_m", change_range_m, 0.5, 100, "m",
+             "... if the newer drive saw the place as well as min_looks looks from this far.");
   }
   std::vector<std::string> validate() const { return {}; }
   ObservationLimits limits() const;
@@ -49,6 +55,10 @@ class DenseTsdf {
   /// Only the rows [first_row, last_row) are touched, so that threads can share the grid by rows.
   void add(const TsdfObservation& observation, int first_row, int last_row);
   void add(const TsdfObservation& observation) { add(observation, 0, geometry_.height_cells); }
+
+  /// Takes in what a later drive saw, on the same geometry: where both agree, both count; where they do not, the
+  /// later one holds, if it saw the place well enough.
+  void renew(const DenseTsdf& later);
 
   bool known(std::size_t i) const { return looks_[i] >= min_looks_; }
   /// Signed distance [m] along the rays, NaN where unknown.

@@ -3,8 +3,6 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "global_map_builder/corrected_drive.h"
-
 namespace knav {
 namespace {
 
@@ -38,17 +36,17 @@ void DriveRecorder::take(const Observation& observation, const Pose2& T_base_sen
     last_refusal_ = result.reason;
     return;
   }
-  if (trajectory_.empty()) {
+  if (drive_.trajectory.empty()) {
     T_drive_local_ = result.T_local_base.inverse();
   } else if (result.epoch != epoch_) {
     const Pose2 T_drive_base =
-        trajectory_.back().T_map_robot * (odometry_.back().T_map_robot.inverse() * result.T_odom_base);
+        drive_.trajectory.back().T_map_robot * (drive_.odometry.back().T_map_robot.inverse() * result.T_odom_base);
     T_drive_local_ = T_drive_base * result.T_local_base.inverse();
     break_pending_ = true;
-    ++breaks_;
+    ++drive_.breaks;
     // The mapper notices late that it went astray: what it said just before is not to be trusted either.
-    for (PoseGraphEdge& edge : edges_) {
-      if (keyframes_[static_cast<std::size_t>(edge.to)].stamp_s >
+    for (PoseGraphEdge& edge : drive_.edges) {
+      if (drive_.keyframes[static_cast<std::size_t>(edge.to)].stamp_s >
           result.stamp_s - config_.doubt_before_break_s) {
         edge.information /= kBreakScale * kBreakScale;
       }
@@ -56,30 +54,30 @@ void DriveRecorder::take(const Observation& observation, const Pose2& T_base_sen
   }
   epoch_ = result.epoch;
   const Pose2 T_drive_base = T_drive_local_ * result.T_local_base;
-  if (!trajectory_.empty()) path_m_ += distance_m(trajectory_.back().T_map_robot, T_drive_base);
-  trajectory_.push_back({result.stamp_s, T_drive_base});
-  odometry_.push_back({result.stamp_s, result.T_odom_base});
+  if (!drive_.trajectory.empty()) path_m_ += distance_m(drive_.trajectory.back().T_map_robot, T_drive_base);
+  drive_.trajectory.push_back({result.stamp_s, T_drive_base});
+  drive_.odometry.push_back({result.stamp_s, result.T_odom_base});
 
-  if (keyframes_.empty() || break_pending_ || mark_pending_ ||
-      moved(keyframes_.back().T_drive_base, T_drive_base, config_.keyframe_distance_m,
+  if (drive_.keyframes.empty() || break_pending_ || mark_pending_ ||
+      moved(drive_.keyframes.back().T_drive_base, T_drive_base, config_.keyframe_distance_m,
             config_.keyframe_angle_deg)) {
     add_keyframe(result, T_drive_base);
   }
   const bool usable = result.outcome != FrameOutcome::kSuspicious;
   if (usable &&
-      (frames_.empty() || result.stamp_s - frames_.back().stamp_s >= config_.frame_period_s ||
-       moved(frames_.back().T_drive_base, T_drive_base, config_.frame_distance_m, config_.frame_angle_deg))) {
-    frames_.push_back(
+      (drive_.frames.empty() || result.stamp_s - drive_.frames.back().stamp_s >= config_.frame_period_s ||
+       moved(drive_.frames.back().T_drive_base, T_drive_base, config_.frame_distance_m, config_.frame_angle_deg))) {
+    drive_.frames.push_back(
         {result.stamp_s, path_m_, T_drive_base, result.T_odom_base, T_base_sensor, observation});
   }
 }
 
 void DriveRecorder::add_keyframe(const LocalMapperResult& result, const Pose2& T_drive_base) {
   Keyframe keyframe{result.stamp_s, path_m_, T_drive_base, result.T_odom_base, break_pending_, mark_pending_};
-  if (!keyframes_.empty()) {
-    const Keyframe& before = keyframes_.back();
+  if (!drive_.keyframes.empty()) {
+    const Keyframe& before = drive_.keyframes.back();
     PoseGraphEdge edge;
-    edge.from = static_cast<int>(keyframes_.size()) - 1;
+    edge.from = static_cast<int>(drive_.keyframes.size()) - 1;
     edge.to = edge.from + 1;
     edge.T_from_to = before.T_drive_base.inverse() * T_drive_base;
     Eigen::Matrix3d covariance =
@@ -93,22 +91,10 @@ void DriveRecorder::add_keyframe(const LocalMapperResult& result, const Pose2& T
       covariance += config_.filter_share * R * result.covariance * R.transpose();
     edge.information = covariance.inverse();
     edge.information = 0.5 * (edge.information + edge.information.transpose().eval());
-    edges_.push_back(edge);
+    drive_.edges.push_back(edge);
   }
-  keyframes_.push_back(keyframe);
+  drive_.keyframes.push_back(keyframe);
   break_pending_ = mark_pending_ = false;
-}
-
-void DriveRecorder::adjust(const std::vector<Pose2>& T_drive_keyframe,
-                           const std::vector<Eigen::Matrix3d>& added) {
-  const CorrectedDrive corrected(keyframes_, T_drive_keyframe);
-  for (DriveFrame& frame : frames_) frame.T_drive_base = corrected.at(frame.stamp_s, frame.T_drive_base);
-  for (StampedPose2& pose : trajectory_) pose.T_map_robot = corrected.at(pose.stamp_s, pose.T_map_robot);
-  for (std::size_t i = 0; i < keyframes_.size(); ++i) keyframes_[i].T_drive_base = T_drive_keyframe[i];
-  for (std::size_t i = 0; i < edges_.size(); ++i) {
-    edges_[i].T_from_to = T_drive_keyframe[i].inverse() * T_drive_keyframe[i + 1];
-    edges_[i].information = (edges_[i].information.inverse() + added[i]).inverse();
-  }
 }
 
 template void DriveRecorder::take(const DepthProfile&, const Pose2&);

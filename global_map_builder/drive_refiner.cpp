@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <memory>
 
-#include "global_map_builder/closure_finder.h"
 #include "global_map_builder/submap.h"
 
 namespace knav {
@@ -23,14 +22,14 @@ MatchConfig match_config() {
 }  // namespace
 
 std::vector<PoseGraphEdge> refine_drive(const RefinementConfig& config, const SurfaceConfig& surface,
-                                        const DriveRecorder& drive,
+                                        const Drive& drive,
                                         const std::function<void(double)>& progress) {
   std::vector<PoseGraphEdge> edges;
   if (!config.enabled) return edges;
   SurfaceConfig near = surface;
   near.range_max_m = std::min(surface.range_max_m, config.range_max_m);
   near.min_looks = 2;
-  const std::vector<Keyframe>& keyframes = drive.keyframes();
+  const std::vector<Keyframe>& keyframes = drive.keyframes;
   const MatchConfig match = match_config();
   const double heading_sd = config.heading_sd_deg * kPi / 180.0,
                position2 = config.position_sd_m * config.position_sd_m;

@@ -3,7 +3,8 @@
 #include <functional>
 #include <vector>
 
-#include "global_map_builder/drive_recorder.h"
+#include "global_map_builder/drive.h"
+#include "global_map_builder/map_builder_config.h"
 #include "global_map_builder/submap_matcher.h"
 
 namespace knav {
@@ -12,7 +13,7 @@ namespace knav {
 /// what was seen round the other. The particle filter's estimate wavers by its sampling noise; these edges
 /// take that out, and being longer than a step they keep it from adding up.
 std::vector<PoseGraphEdge> refine_drive(const RefinementConfig& config, const SurfaceConfig& surface,
-                                        const DriveRecorder& drive,
+                                        const Drive& drive,
                                         const std::function<void(double)>& progress);
 
 }  // namespace knav

@@ -28,11 +28,11 @@ double median(std::vector<double> values) {
 
 Eigen::Vector3d vector_of(const Pose2& pose) { return {pose.x_m, pose.y_m, pose.yaw_rad}; }
 
-std::vector<Deviation> deviations_of(const DriveRecorder& drive) {
+std::vector<Deviation> deviations_of(const Drive& drive) {
   std::vector<Deviation> deviations;
-  for (const PoseGraphEdge& edge : drive.edges()) {
-    const Keyframe& from = drive.keyframes()[static_cast<std::size_t>(edge.from)];
-    const Keyframe& to = drive.keyframes()[static_cast<std::size_t>(edge.to)];
+  for (const PoseGraphEdge& edge : drive.edges) {
+    const Keyframe& from = drive.keyframes[static_cast<std::size_t>(edge.from)];
+    const Keyframe& to = drive.keyframes[static_cast<std::size_t>(edge.to)];
     const Pose2 odometry = from.T_odom_base.inverse() * to.T_odom_base;
     const Eigen::Vector2d motion(std::hypot(odometry.x_m, odometry.y_m), odometry.yaw_rad);
     deviations.push_back({vector_of(odometry.inverse() * edge.T_from_to), motion,
@@ -86,16 +86,16 @@ Eigen::Vector3d step_sd() { return {kStepPosition_sd_m, kStepPosition_sd_m, kSte
 }  // namespace
 
 int smooth_drive(const RefinementConfig& config, const GraphOptimizerConfig& graph_config,
-                 const SurfaceConfig& surface, DriveRecorder* drive,
+                 const SurfaceConfig& surface, Drive* drive,
                  const std::function<void(double)>& progress) {
-  const std::vector<PoseGraphEdge> steps = drive->edges();
+  const std::vector<PoseGraphEdge> steps = drive->edges;
   if (!config.enabled || steps.size() < kMinSteps) return 0;
   const std::vector<Deviation> deviations = deviations_of(*drive);
   const Usual usual = usual_of(deviations);
 
   PoseGraph graph;
-  for (std::size_t i = 0; i < drive->keyframes().size(); ++i) {
-    graph.nodes[static_cast<int>(i)] = drive->keyframes()[i].T_drive_base;
+  for (std::size_t i = 0; i < drive->keyframes.size(); ++i) {
+    graph.nodes[static_cast<int>(i)] = drive->keyframes[i].T_drive_base;
   }
   std::vector<bool> jump(steps.size());
   for (std::size_t i = 0; i < steps.size(); ++i) {
@@ -109,8 +109,8 @@ int smooth_drive(const RefinementConfig& config, const GraphOptimizerConfig& gra
       graph.edges.push_back(step);
     }
     PoseGraphEdge odometry = steps[i];
-    const Keyframe& from = drive->keyframes()[i];
-    const Keyframe& to = drive->keyframes()[i + 1];
+    const Keyframe& from = drive->keyframes[i];
+    const Keyframe& to = drive->keyframes[i + 1];
     const Eigen::Vector3d bias = usual.bias(deviations[i]);
     odometry.T_from_to = from.T_odom_base.inverse() * to.T_odom_base * Pose2{bias.x(), bias.y(), bias.z()};
     odometry.information = diagonal_information(config.odometry_sd_factor * deviations[i].units * usual.sd);

@@ -2,7 +2,8 @@
 
 #include <functional>
 
-#include "global_map_builder/drive_recorder.h"
+#include "global_map_builder/drive.h"
+#include "global_map_builder/map_builder_config.h"
 
 namespace knav {
 
@@ -14,7 +15,7 @@ namespace knav {
 /// apart, coarse but free of drift.
 /// @return the number of steps found to be jumps
 int smooth_drive(const RefinementConfig& config, const GraphOptimizerConfig& graph,
-                 const SurfaceConfig& surface, DriveRecorder* drive,
+                 const SurfaceConfig& surface, Drive* drive,
                  const std::function<void(double)>& progress);
 
 }  // namespace knav

@@ -93,6 +93,7 @@ Outcome solve(const GraphOptimizerConfig& config, PoseGraph* graph) {
                              values.at(edge.from).data(), values.at(edge.to).data());
   }
   for (const int anchor : anchor_nodes(*graph)) problem.SetParameterBlockConstant(values.at(anchor).data());
+  for (const int node : graph->held) problem.SetParameterBlockConstant(values.at(node).data());
 
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
@@ -125,12 +126,14 @@ GraphOptimizerSummary optimize(const GraphOptimizerConfig& config, PoseGraph* gr
     summary.initialization = name;
     best = std::move(trial);
   };
-  if (config.initialization != "given") {
+  // The chordal relaxation knows one anchor a part only.
+  const bool chordal = config.initialization != "given" && graph->held.empty();
+  if (chordal) {
     PoseGraph trial = *graph;
     initialize_chordal(&trial);
     attempt("chordal", std::move(trial));
   }
-  if (config.initialization != "chordal") attempt("given", *graph);
+  if (config.initialization != "chordal" || !chordal) attempt("given", *graph);
   graph->nodes = std::move(best.nodes);
   summary.final_chi2 = chi2(*graph);
   summary.time_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

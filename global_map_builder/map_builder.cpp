@@ -10,6 +10,7 @@
 
 #include "core/config.h"
 #include "core/error.h"
+#include "global_map_builder/closure_finder.h"
 #include "global_map_builder/contour_distance.h"
 #include "global_map_builder/corrected_drive.h"
 #include "global_map_builder/drive_smoother.h"
@@ -50,16 +51,30 @@ GridGeometry enclosing(const GridGeometry& a, const GridGeometry& b) {
   return g;
 }
 
-GridGeometry extent(const MapBuilderConfig& config, const DriveRecorder& drive,
-                    const CorrectedDrive& corrected) {
+/// The drives' corrected poses.
+std::vector<CorrectedDrive> corrected_drives(const std::vector<Drive>& drives, const std::vector<Pose2>& poses) {
+  std::vector<CorrectedDrive> out;
+  auto first = poses.begin();
+  for (const Drive& drive : drives) {
+    const auto last = first + static_cast<std::ptrdiff_t>(drive.keyframes.size());
+    out.emplace_back(drive.keyframes, std::vector<Pose2>(first, last));
+    first = last;
+  }
+  return out;
+}
+
+GridGeometry extent(const MapBuilderConfig& config, const std::vector<Drive>& drives,
+                    const std::vector<CorrectedDrive>& corrected) {
   GridGeometry geometry;
   geometry.resolution_m = config.surface.resolution_m;
-  const auto& frames = drive.frames();
-  for (std::size_t first = 0; first < frames.size(); first += kBatch) {
-    const std::size_t last = std::min(frames.size(), first + kBatch);
-    geometry =
-        enclosing(geometry, geometry_for(config.surface.resolution_m,
-                                         prepare(frames, first, last, corrected, config.surface.limits())));
+  for (std::size_t d = 0; d < drives.size(); ++d) {
+    const auto& frames = drives[d].frames;
+    for (std::size_t first = 0; first < frames.size(); first += kBatch) {
+      const std::size_t last = std::min(frames.size(), first + kBatch);
+      geometry =
+          enclosing(geometry, geometry_for(config.surface.resolution_m,
+                                           prepare(frames, first, last, corrected[d], config.surface.limits())));
+    }
   }
   const double width_m = geometry.width_cells * geometry.resolution_m;
   const double height_m = geometry.height_cells * geometry.resolution_m;
@@ -71,24 +86,44 @@ GridGeometry extent(const MapBuilderConfig& config, const DriveRecorder& drive,
   return geometry;
 }
 
-DenseTsdf integrate(const MapBuilderConfig& config, const DriveRecorder& drive,
-                    const CorrectedDrive& corrected, const GridGeometry& geometry, const Report& report) {
-  DenseTsdf tsdf(geometry, config.surface);
-  const auto& frames = drive.frames();
-  const int bands = (geometry.height_cells + kBand_rows - 1) / kBand_rows;
+void integrate(const MapBuilderConfig& config, const Drive& drive, const CorrectedDrive& corrected,
+               const std::function<void(double)>& report, DenseTsdf* tsdf) {
+  const auto& frames = drive.frames;
+  const int rows = tsdf->geometry().height_cells, bands = (rows + kBand_rows - 1) / kBand_rows;
   for (std::size_t first = 0; first < frames.size(); first += kBatch) {
-    report("surface", static_cast<double>(first) / static_cast<double>(frames.size()));
+    report(static_cast<double>(first) / static_cast<double>(frames.size()));
     const std::size_t last = std::min(frames.size(), first + kBatch);
     const auto batch = prepare(frames, first, last, corrected, config.surface.limits());
     // Every cell belongs to one band and takes the frames in their order: the same sums on any number of
     // threads.
     tbb::parallel_for(0, bands, [&](int band) {
       for (const TsdfObservation& o : batch) {
-        tsdf.add(o, band * kBand_rows, std::min(geometry.height_cells, (band + 1) * kBand_rows));
+        tsdf->add(o, band * kBand_rows, std::min(rows, (band + 1) * kBand_rows));
       }
     });
   }
-  return tsdf;
+}
+
+/// One surface of all drives, the newer correcting the older.
+std::vector<float> surface_of(const MapBuilderConfig& config, const std::vector<Drive>& drives,
+                              const std::vector<CorrectedDrive>& corrected, const GridGeometry& geometry,
+                              const Report& report) {
+  DenseTsdf whole(geometry, config.surface);
+  for (std::size_t d = 0; d < drives.size(); ++d) {
+    const auto part = [&](double fraction) {
+      report("surface", (static_cast<double>(d) + fraction) / static_cast<double>(drives.size()));
+    };
+    if (d == 0) {
+      integrate(config, drives[d], corrected[d], part, &whole);
+      continue;
+    }
+    DenseTsdf newer(geometry, config.surface);
+    integrate(config, drives[d], corrected[d], part, &newer);
+    whole.renew(newer);
+  }
+  std::vector<float> value(geometry.cell_count());
+  for (std::size_t i = 0; i < value.size(); ++i) value[i] = whole.distance_m(i);
+  return value;
 }
 
 /// The part of the grid that is known, with a margin.
@@ -136,10 +171,9 @@ void mark_surface(const Contour& contour, OccupancyGrid* grid) {
   }
 }
 
-/// The cells whose centres the robot's body was on.
-std::vector<bool> driven_cells(const GridGeometry& g, const Trajectory& trajectory, double radius_m) {
-  std::vector<bool> driven(g.cell_count(), false);
-  if (radius_m <= 0.0) return driven;
+/// Marks the cells whose centres the robot's body was on.
+void mark_driven(const GridGeometry& g, const Trajectory& trajectory, double radius_m, std::vector<bool>* driven) {
+  if (radius_m <= 0.0) return;
   Pose2 last;
   bool any = false;
   for (const StampedPose2& pose : trajectory) {
@@ -151,26 +185,132 @@ std::vector<bool> driven_cells(const GridGeometry& g, const Trajectory& trajecto
       for (int ix = g.cell_x(T.x_m - radius_m); ix <= g.cell_x(T.x_m + radius_m); ++ix) {
         if (g.contains(ix, iy) &&
             std::hypot(g.center_x_m(ix) - T.x_m, g.center_y_m(iy) - T.y_m) <= radius_m) {
-          driven[g.index(ix, iy)] = true;
+          (*driven)[g.index(ix, iy)] = true;
         }
       }
     }
   }
-  return driven;
+}
+
+/// What the map would be without closures: coarse, for a picture.
+OccupancyGrid uncorrected_map(const MapBuilderConfig& config, const std::vector<Drive>& drives,
+                              const std::vector<CorrectedDrive>& corrected) {
+  constexpr std::size_t kStride = 3;
+  MapBuilderConfig coarse = config;
+  coarse.surface.resolution_m = 2.0 * config.surface.resolution_m;
+  coarse.surface.min_looks = 1;
+  coarse.size_max_m = 1e9;
+  std::vector<Drive> thinned(drives.size());
+  std::vector<CorrectedDrive> rigid;
+  for (std::size_t d = 0; d < drives.size(); ++d) {
+    const Drive& drive = drives[d];
+    for (std::size_t i = 0; i < drive.frames.size(); i += kStride) thinned[d].frames.push_back(drive.frames[i]);
+    // Only put where it began.
+    const Keyframe& start = drive.keyframes.front();
+    const Pose2 T_map_start = corrected[d].at(start.stamp_s, start.T_drive_base);
+    rigid.emplace_back(std::vector<Keyframe>{start}, std::vector<Pose2>{T_map_start});
+  }
+  OccupancyGrid grid;
+  grid.geometry = extent(coarse, thinned, rigid);
+  grid.value.assign(grid.geometry.cell_count(), -1);
+  constexpr std::size_t kMaxCells = 40'000'000;  // a runaway estimate is not worth the memory
+  if (grid.value.size() > kMaxCells) return {};
+  const std::vector<float> value = surface_of(coarse, thinned, rigid, grid.geometry, [](const char*, double) {});
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    if (!std::isnan(value[i])) grid.value[i] = value[i] > 0.0f ? 0 : 100;
+  }
+  return grid;
+}
+
+/// One trajectory in the order of stamps; where two drives' clocks overlap, the newer one's.
+Trajectory joined(const std::vector<Trajectory>& parts) {
+  Trajectory out;
+  for (const Trajectory& part : parts) {
+    if (part.empty()) continue;
+    const double first_s = part.front().stamp_s, last_s = part.back().stamp_s;
+    out.erase(std::remove_if(out.begin(), out.end(),
+                             [&](const StampedPose2& p) { return p.stamp_s >= first_s && p.stamp_s <= last_s; }),
+              out.end());
+    const auto place = std::lower_bound(out.begin(), out.end(), first_s,
+                                        [](const StampedPose2& p, double s) { return p.stamp_s < s; });
+    out.insert(place, part.begin(), part.end());
+  }
+  return out;
+}
+
+/// The node that a line of the list means.
+int node_of(const DriveSet& set, int drive, double stamp_s, const std::string& where) {
+  constexpr double kSame_s = 0.005;
+  if (drive < 0 || drive >= set.count()) throw UserError(fmt::format("{}: there is no drive {}.", where, drive));
+  for (int node = set.first(drive); node < set.first(drive + 1); ++node) {
+    if (std::fabs(set.keyframe(node).stamp_s - stamp_s) < kSame_s) return node;
+  }
+  throw UserError(fmt::format(
+      "{}: there is no keyframe at {:.3f} s in drive {}; is the list of another recording or configuration?", where,
+      stamp_s, drive));
+}
+
+std::vector<ClosureVerdict> verdicts_of(const std::vector<ListedClosure>& list, const DriveSet& set) {
+  std::vector<ClosureVerdict> out;
+  for (const ListedClosure& line : list) {
+    ClosureVerdict v;
+    v.from = node_of(set, line.from_drive, line.from_stamp_s, line.where);
+    v.to = node_of(set, line.to_drive, line.to_stamp_s, line.where);
+    if (v.from >= v.to) throw UserError(line.where + ": 'from' must be the earlier of the two visits.");
+    v.allow = line.allow;
+    v.T_from_to = line.T_from_to;
+    v.has_transform = line.has_transform;
+    out.push_back(v);
+  }
+  return out;
+}
+
+OccupancyGrid on_lattice(const OccupancyGrid& grid, const GridGeometry& geometry) {
+  OccupancyGrid out;
+  out.geometry = geometry;
+  out.value.assign(geometry.cell_count(), 0);
+  for (int iy = 0; iy < geometry.height_cells; ++iy) {
+    for (int ix = 0; ix < geometry.width_cells; ++ix) {
+      const int x = grid.geometry.cell_x(geometry.center_x_m(ix)), y = grid.geometry.cell_y(geometry.center_y_m(iy));
+      if (grid.geometry.contains(x, y)) out.value[geometry.index(ix, iy)] = grid.value[grid.geometry.index(x, y)];
+    }
+  }
+  return out;
 }
 
 }  // namespace
 
 MapBuilder::MapBuilder(const MapBuilderConfig& config, const LocalMapperConfig& mapper)
-    : config_(config), drive_(config.drive, mapper) {
+    : config_(config), mapper_(mapper), recorder_(std::make_unique<DriveRecorder>(config.drive, mapper)) {
   std::vector<std::string> faults = config.validate();
   if (!faults.empty()) throw_faults(faults);
 }
 
+void MapBuilder::extend(MapRecord record, MapDirectory map) {
+  old_ = std::move(record);
+  old_map_ = std::move(map);
+}
+
+void MapBuilder::end_drive() {
+  if (!recorder_->drive().keyframes.empty()) drives_.push_back(recorder_->take_drive());
+}
+
+void MapBuilder::begin_drive(const std::string& name) {
+  end_drive();
+  recorder_ = std::make_unique<DriveRecorder>(config_.drive, mapper_);
+  recorder_->set_name(name);
+}
+
 BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progress) {
-  if (drive_.frames().empty()) {
-    throw UserError(drive_.last_refusal().empty() ? "there are no observations to build a map from."
-                                                  : "no observation could be used: " + drive_.last_refusal());
+  const std::string refusal = recorder_->last_refusal();
+  end_drive();
+  for (const Drive& drive : drives_) {
+    if (!drive.frames.empty()) continue;
+    throw UserError((drive.name.empty() ? "" : drive.name + ": ") + "no observation of it can be mapped.");
+  }
+  if (drives_.empty()) {
+    throw UserError(refusal.empty() ? "there are no observations to build a map from."
+                                    : "no observation could be used: " + refusal);
   }
   BuiltMap built;
   auto stage_start = std::chrono::steady_clock::now();
@@ -183,22 +323,34 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
     if (progress) progress(stage, fraction);
   };
 
-  built.mended_steps = smooth_drive(config_.refinement, config_.graph, config_.surface, &drive_,
-                                    [&](double fraction) { report("refinement", fraction); });
+  for (Drive& drive : drives_) {
+    built.mended_steps += smooth_drive(config_.refinement, config_.graph, config_.surface, &drive,
+                                       [&](double fraction) { report("refinement", fraction); });
+  }
   end_stage("refinement");
-  ClosureFinder finder(config_, drive_);
-  finder.run([&](double fraction) { report("closures", fraction); });
-  built.graph = finder.graph();
-  built.closures = finder.closures();
-  for (const auto& [id, pose] : built.graph.nodes) built.keyframes.push_back(pose);
+
+  built.old_drives = static_cast<int>(old_.drives.size());
+  std::vector<Drive>& drives = built.record.drives;
+  drives = std::move(old_.drives);
+  for (Drive& drive : drives_) drives.push_back(std::move(drive));
+  drives_.clear();
+  {
+    const DriveSet set(drives);
+    ClosureFinder finder(config_, set);
+    finder.hold(old_.T_map_keyframe, old_.closures);
+    finder.set_verdicts(verdicts_of(list_, set));
+    finder.run([&](double fraction) { report("closures", fraction); });
+    built.graph = finder.graph();
+    built.record.closures = finder.closures();
+  }
+  for (const auto& [id, pose] : built.graph.nodes) built.record.T_map_keyframe.push_back(pose);
   end_stage("closures");
 
-  const CorrectedDrive corrected(drive_.keyframes(), built.keyframes);
-  GridGeometry geometry = extent(config_, drive_, corrected);
-  const DenseTsdf tsdf = integrate(config_, drive_, corrected, geometry, report);
-  std::vector<float> value(geometry.cell_count());
-  for (std::size_t i = 0; i < value.size(); ++i) value[i] = tsdf.distance_m(i);
+  const std::vector<CorrectedDrive> corrected = corrected_drives(drives, built.record.T_map_keyframe);
+  GridGeometry geometry = extent(config_, drives, corrected);
+  std::vector<float> value = surface_of(config_, drives, corrected, geometry, report);
   crop(known_part(geometry, value), &geometry, &value);
+  built.before = uncorrected_map(config_, drives, corrected);
   end_stage("surface");
 
   report("distance", 0.0);
@@ -209,14 +361,22 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
   map.distance.distance_m = config_.distance == "paper" ? ray_traced_distance_m(geometry, value, 3600)
                                                         : contour_distance_m(geometry, built.contour);
 
-  const Pose2 T_start_odom = drive_.odometry().front().T_map_robot.inverse();
-  for (std::size_t i = 0; i < drive_.trajectory().size(); ++i) {
-    const StampedPose2& pose = drive_.trajectory()[i];
-    map.trajectory.push_back({pose.stamp_s, corrected.at(pose.stamp_s, pose.T_map_robot)});
-    built.odometry.push_back({pose.stamp_s, T_start_odom * drive_.odometry()[i].T_map_robot});
+  std::vector<Trajectory> trajectories;
+  std::vector<bool> driven(geometry.cell_count(), false);
+  for (std::size_t d = 0; d < drives.size(); ++d) {
+    Trajectory& trajectory = trajectories.emplace_back();
+    for (const StampedPose2& pose : drives[d].trajectory) {
+      trajectory.push_back({pose.stamp_s, corrected[d].at(pose.stamp_s, pose.T_map_robot)});
+    }
+    mark_driven(geometry, trajectory, config_.robot_radius_m, &driven);
+  }
+  map.trajectory = joined(trajectories);
+  built.drive = drives.back().trajectory;
+  const Pose2 T_start_odom = drives.back().odometry.front().T_map_robot.inverse();
+  for (const StampedPose2& pose : drives.back().odometry) {
+    built.odometry.push_back({pose.stamp_s, T_start_odom * pose.T_map_robot});
   }
 
-  const std::vector<bool> driven = driven_cells(geometry, map.trajectory, config_.robot_radius_m);
   map.occupancy.geometry = geometry;
   map.occupancy.value.assign(value.size(), -1);
   for (std::size_t i = 0; i < value.size(); ++i) {
@@ -234,9 +394,12 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
   mark_surface(built.contour, &map.occupancy);
   map.keepout.geometry = geometry;
   map.keepout.value.assign(geometry.cell_count(), 0);
+  if (built.old_drives > 0) {
+    map.keepout = on_lattice(old_map_.keepout, geometry);
+    map.places = old_map_.places;
+    built.changes = find_changes(old_map_.occupancy, map.occupancy, config_.surface.change_m, config_.min_change_m);
+  }
   end_stage("distance");
-
-  built.drive = drive_.trajectory();
   return built;
 }
 

@@ -65,6 +65,12 @@ struct ClosureConfig {
   double nearest_m = 4.0;
   double max_innovation = 40.0;
   int passes = 2;
+  double locate_spacing_m = 3.0;
+  int locate_agreeing = 3;
+  double allowed_sd_m = 0.05;
+  double allowed_sd_deg = 0.5;
+  double falsify_share = 0.0;
+  int falsify_seed = 1;
   MatchConfig match;
 
   template <class Visitor>
@@ -93,6 +99,16 @@ struct ClosureConfig {
              "wrong.");
     v.integer("passes", passes, 1, 5, "",
               "Passes over the drive; each starts from the graph that the last one left.");
+    v.number("locate_spacing_m", locate_spacing_m, 0.5, 50, "m",
+             "A further drive is sought among local maps of the earlier ones every so far, with its own every "
+             "twice as far.");
+    v.integer("locate_agreeing", locate_agreeing, 2, 100, "",
+              "So many of its places must agree on where it lies.");
+    v.number("allowed_sd_m", allowed_sd_m, 0.001, 5, "m", "How well a closure of the user's list is trusted (sd).");
+    v.number("allowed_sd_deg", allowed_sd_deg, 0.01, 90, "deg", "Likewise its heading.");
+    v.number("falsify_share", falsify_share, 0, 1, "",
+             "For measuring robustness: this share of the closures found is moved by metres on purpose.");
+    v.integer("falsify_seed", falsify_seed, 0, 1000000, "", "Which ones.");
     v.group("match", match, "When a match counts.");
   }
   std::vector<std::string> validate() const { return {}; }
@@ -147,6 +163,7 @@ struct MapBuilderConfig {
   double robot_radius_m = 0.20;
   std::string distance = "exact";
   double size_max_m = 400.0;
+  double min_change_m = 0.3;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -163,6 +180,8 @@ struct MapBuilderConfig {
              "exact: distance transform of the contour. paper: ray tracing from every cell (minutes).");
     v.number("size_max_m", size_max_m, 5, 2000, "m",
              "A map larger than this in either direction is refused as an error.");
+    v.number("min_change_m", min_change_m, 0.05, 10, "m",
+             "Extending a map reports surfaces that came or went from this length on.");
   }
   std::vector<std::string> validate() const {
     std::vector<std::string> faults = refinement.validate();

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,7 @@ struct PoseGraphEdge {
 struct PoseGraph {
   std::map<int, Pose2> nodes;  ///< T_map_node
   std::vector<PoseGraphEdge> edges;
+  std::set<int> held;  ///< nodes that the optimiser leaves where they are
 };
 
 /// g2o's VERTEX_SE2 / EDGE_SE2, or TORO's VERTEX2 / EDGE2, told apart by the tags. Nodes that only edges name

@@ -9,6 +9,7 @@
 #include "depth_profile_nodelet/front_end.h"
 #include "global_map_builder/build_map_config.h"
 #include "global_map_builder/map_server_config.h"
+#include "global_map_builder/live_map_builder_config.h"
 #include "global_map_builder/mapping_recorder_config.h"
 #include "kinect_sim/simulator_node_config.h"
 #include "kinect_sim/tour_driver_config.h"
@@ -45,6 +46,7 @@ std::vector<Section> all_sections() {
       section<FloorRemovalConfig>("floor_removal", "Finds the floor, and keeps the slice of the world above it."),
       section<DepthProfileConfig>("depth_profile", "One depth per image column."),
       section<LocalMapperConfig>("local_mapper", "The sliding-window map, the motion estimate and the 360-degree scan."),
+      section<LiveMapBuilderConfig>("live_map_builder", "Builds a map while the robot drives."),
       section<MappingRecorderConfig>("mapping_recorder", "Records the mapping drive."),
       section<BuildMapConfig>("map_builder", "From a recording to a map (build_map)."),
       section<MapServerConfig>("map_server", "Publishes a map directory."),

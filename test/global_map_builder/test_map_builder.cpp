@@ -3,39 +3,12 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "flat_world.h"
-#include "global_map_builder/map_builder.h"
+#include "flat_drive.h"
 
 namespace knav {
 namespace {
 
 using namespace flat_world;
-
-constexpr double kStart_s = 100.0;
-constexpr double kPeriod_s = 0.1;
-const Pose2 kMount{0.05, 0.0, 0.0};
-
-struct Drive {
-  std::vector<Wall> walls = ring();
-  std::vector<Pose2> truth, odometry;
-};
-
-Drive once_round_and_a_bit() {
-  Drive drive;
-  drive.truth = drive_through({{0, 0}, {11, 0}, {11, 7}, {0, 7}, {0, 0}, {6, 0}});
-  drive.odometry = drifting_odometry(drive.truth);
-  return drive;
-}
-
-void feed(const Drive& drive, const std::vector<std::size_t>& marks, MapBuilder* builder) {
-  for (std::size_t i = 0; i < drive.truth.size(); ++i) {
-    const double stamp_s = kStart_s + static_cast<double>(i) * kPeriod_s;
-    builder->add_odometry(stamp_s, drive.odometry[i]);
-    if (std::count(marks.begin(), marks.end(), i) > 0) builder->mark(stamp_s);
-    RandomStream random(7, random_stream::kTest, i, 0);
-    builder->add(profile_at(drive.walls, drive.truth[i] * kMount, stamp_s, random), kMount);
-  }
-}
 
 MapBuilderConfig only(bool automatic, bool buttons) {
   MapBuilderConfig config;
@@ -45,21 +18,13 @@ MapBuilderConfig only(bool automatic, bool buttons) {
   return config;
 }
 
-LocalMapperConfig small_mapper() {
-  LocalMapperConfig config;
-  config.filter.particles = 300;
-  config.grid_half_size_m = 14.0;
-  config.range_max_m = config.contour.range_max_m = 10.0;
-  return config;
-}
-
-double final_error_m(const Drive& drive, const BuiltMap& built) {
+double final_error_m(const Route& drive, const BuiltMap& built) {
   const Pose2 T_start_end = drive.truth.front().inverse() * drive.truth.back();
   return distance_m(built.map.trajectory.back().T_map_robot, T_start_end);
 }
 
 /// Root mean square distance of the contour to the true walls; the start pose is the origin of both.
-double contour_rmse_m(const Drive& drive, const Contour& contour) {
+double contour_rmse_m(const Route& drive, const Contour& contour) {
   double squares = 0.0;
   const std::vector<Point2> points = sample_contour(contour, 0.05);
   for (const Point2& p : points) squares += std::pow(distance_to_walls(drive.walls, p.x_m, p.y_m), 2);
@@ -83,18 +48,18 @@ double completeness(const Contour& contour) {
   return found / all;
 }
 
-double wheel_error_m(const Drive& drive) {
+double wheel_error_m(const Route& drive) {
   return distance_m(drive.odometry.front().inverse() * drive.odometry.back(),
                     drive.truth.front().inverse() * drive.truth.back());
 }
 
 TEST(MapBuilder, ClosesALoopOfDriftingOdometryByItself) {
-  const Drive drive = once_round_and_a_bit();
+  const Route drive = once_round_and_a_bit();
   ASSERT_GT(wheel_error_m(drive), 2.0);
   MapBuilder builder(only(true, false), small_mapper());
   feed(drive, {}, &builder);
   const BuiltMap built = builder.build();
-  const auto accepted = std::count_if(built.closures.begin(), built.closures.end(),
+  const auto accepted = std::count_if(built.record.closures.begin(), built.record.closures.end(),
                                       [](const Closure& c) { return c.accepted; });
   EXPECT_GE(accepted, 1);
   EXPECT_LT(final_error_m(drive, built), 0.15);
@@ -121,7 +86,7 @@ TEST(MapBuilder, ClosesALoopOfDriftingOdometryByItself) {
 }
 
 TEST(MapBuilder, ClosesALoopByTheButtonAlone) {
-  const Drive drive = once_round_and_a_bit();
+  const Route drive = once_round_and_a_bit();
   // The robot stands at (0, 0) at first and again after the round: where the truth comes nearest to it late.
   std::size_t back = drive.truth.size() / 2;
   for (std::size_t i = back; i < drive.truth.size(); ++i) {
@@ -130,14 +95,14 @@ TEST(MapBuilder, ClosesALoopByTheButtonAlone) {
   MapBuilder builder(only(false, true), small_mapper());
   feed(drive, {0, back}, &builder);
   const BuiltMap built = builder.build();
-  ASSERT_EQ(built.closures.size(), 1u);
-  EXPECT_EQ(built.closures[0].source, "button");
-  EXPECT_TRUE(built.closures[0].accepted);
+  ASSERT_EQ(built.record.closures.size(), 1u);
+  EXPECT_EQ(built.record.closures[0].source, "button");
+  EXPECT_TRUE(built.record.closures[0].accepted);
   EXPECT_LT(final_error_m(drive, built), 0.15);
 }
 
 TEST(MapBuilder, TheSameDriveGivesTheSameMap) {
-  Drive drive;
+  Route drive;
   drive.truth = drive_through({{0, 0}, {4, 0}});
   drive.odometry = drifting_odometry(drive.truth);
   std::string checksum[2];
