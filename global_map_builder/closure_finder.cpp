@@ -160,8 +160,10 @@ bool ClosureFinder::tried(int from, int to, const Pose2& prior) const {
 /// The entry of the list that keeps a closure out: its own, or that of a neighbouring pair with the same mistake.
 const ClosureVerdict* ClosureFinder::denied(const Closure& closure) const {
   for (const ClosureVerdict& v : verdicts_) {
+    if (!v.allow && v.from == closure.from && v.to == closure.to) return &v;
+  }
+  for (const ClosureVerdict& v : verdicts_) {
     if (v.allow) continue;
-    if (v.from == closure.from && v.to == closure.to) return &v;
     if (!v.has_transform || set_.drive_of(v.from) != set_.drive_of(closure.from) ||
         set_.drive_of(v.to) != set_.drive_of(closure.to) ||
         std::fabs(path_m(v.from) - path_m(closure.from)) > config_.closures.submap_half_length_m ||

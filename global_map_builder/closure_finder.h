@@ -77,7 +77,10 @@ class ClosureFinder {
     Pose2 T_map_drive;
     std::vector<Hypothesis> agreeing;  ///< its places where the map agrees
     int contradicting = 0;             ///< where it shows something else
-    int excess() const { return static_cast<int>(agreeing.size()) - contradicting; }
+    double astray = 1.0;               ///< share of the compared walls that the other does not show
+    double worth() const {
+      return (static_cast<double>(agreeing.size()) - contradicting) * (1.0 - 2.0 * astray);
+    }
   };
 
   const Submap& submap(int keyframe);
@@ -92,6 +95,7 @@ class ClosureFinder {
   std::vector<Hypothesis> distinct(const std::vector<Hypothesis>& found) const;
   void judge_location(int drive, std::size_t found, const std::vector<Location>& locations);
   void move_drive(int drive, const Pose2& T_map_drive);
+  bool agree(const Hypothesis& h, const Hypothesis& with) const;
   std::vector<Hypothesis> agreeing(const std::vector<Hypothesis>& found, const Hypothesis& with) const;
   std::vector<int> spread(int first, int last, double spacing_m) const;
   std::vector<int> earlier_visits(int keyframe, int lowest) const;

@@ -14,7 +14,11 @@ namespace {
 /// How far two statements about a drive's place may part: its own drift between the two places comes on top.
 constexpr double kAgree_m = 0.4;
 constexpr double kAgree_rad = 0.09;
+constexpr double kTurn_m = 1.0;            // metres that a radian counts for
 constexpr double kDriftPath_m = 20.0;      // the heading's drift is not counted beyond
+constexpr double kComparable = 0.15;       // overlap from which two local maps say something of each other
+constexpr double kMostAstray = 0.15;       // share of walls that may lie where the map has none
+constexpr double kMuchMoreAstray = 1.5;    // a place where so many times more lie astray is no rival
 constexpr std::size_t kMostAsked = 60;     // places of the new drive that are looked for everywhere
 constexpr std::size_t kMostVerified = 12;  // places where the drive may lie
 
@@ -41,19 +45,22 @@ void ClosureFinder::prepare_submaps(const std::vector<int>& keyframes) {
   tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t i) { make_submap(missing[i]); });
 }
 
+/// Whether two hypotheses put the drive at the same place, given the drift between where they were taken.
+bool ClosureFinder::agree(const Hypothesis& h, const Hypothesis& with) const {
+  const Pose2 here = graph_.nodes.at(h.to);  // in the drive's own frame
+  const Pose2 a = h.T_map_drive * here, b = with.T_map_drive * here;
+  const double way_m = std::fabs(path_m(h.to) - path_m(with.to));
+  return distance_m(a, b) <= kAgree_m + config_.closures.search_per_m * way_m &&
+         std::fabs(normalize_angle_rad(a.yaw_rad - b.yaw_rad)) <=
+             kAgree_rad + config_.closures.search_angle_deg_per_m * kPi / 180.0 * std::min(way_m, kDriftPath_m);
+}
+
 /// The hypotheses that put the drive where `with` does, one for each place of the drive.
 std::vector<ClosureFinder::Hypothesis> ClosureFinder::agreeing(const std::vector<Hypothesis>& found,
                                                                const Hypothesis& with) const {
   std::vector<Hypothesis> out;
   for (const Hypothesis& h : found) {
-    const Pose2 here = graph_.nodes.at(h.to);  // in the drive's own frame
-    const Pose2 a = h.T_map_drive * here, b = with.T_map_drive * here;
-    const double way_m = std::fabs(path_m(h.to) - path_m(with.to));
-    if (distance_m(a, b) > kAgree_m + config_.closures.search_per_m * way_m ||
-        std::fabs(normalize_angle_rad(a.yaw_rad - b.yaw_rad)) >
-            kAgree_rad + config_.closures.search_angle_deg_per_m * kPi / 180.0 * std::min(way_m, kDriftPath_m)) {
-      continue;
-    }
+    if (!agree(h, with)) continue;
     const bool same = !out.empty() && out.back().to == h.to;
     if (same && out.back().match.score >= h.match.score) continue;
     if (same) out.pop_back();
@@ -79,10 +86,13 @@ ClosureFinder::Location ClosureFinder::verify(const Hypothesis& h, const std::ve
   std::vector<Look> looks(asked.size());
   tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t i) {
     const Pose2 here = h.T_map_drive * graph_.nodes.at(asked[i]);
-    const auto nearer = [&](int a, int b) {
-      return distance_m(graph_.nodes.at(a), here) < distance_m(graph_.nodes.at(b), here);
+    // The nearest, one that looked the same way rather than one that did not: the camera sees 57 degrees.
+    const auto apart = [&](int place) {
+      const Pose2& there = graph_.nodes.at(place);
+      return distance_m(there, here) + kTurn_m * std::fabs(normalize_angle_rad(there.yaw_rad - here.yaw_rad));
     };
-    const int place = *std::min_element(places.begin(), places.end(), nearer);
+    const int place =
+        *std::min_element(places.begin(), places.end(), [&](int a, int b) { return apart(a) < apart(b); });
     const Pose2 T_place_here = graph_.nodes.at(place).inverse() * here;
     if (distance_m(T_place_here, {}) > 1.5 * c.locate_spacing_m) return;
     const double way_m = std::fabs(path_m(asked[i]) - path_m(h.to));
@@ -100,10 +110,16 @@ ClosureFinder::Location ClosureFinder::verify(const Hypothesis& h, const std::ve
   });
   Location location;
   location.T_map_drive = h.T_map_drive;
+  double seen_m = 0.0, astray_m = 0.0;
   for (const Look& look : looks) {
     if (look.agrees) location.agreeing.push_back(look.match);
     location.contradicting += look.contradicts;
+    const MatchResult& match = look.match.match;
+    if (match.overlap < kComparable || !(match.agreement > 0.0)) continue;
+    seen_m += match.surface_m / match.agreement;
+    astray_m += match.surface_m / match.agreement * (1.0 - match.agreement);
   }
+  location.astray = seen_m > 0.0 ? astray_m / seen_m : 1.0;
   return location;
 }
 
@@ -139,7 +155,7 @@ void ClosureFinder::locate(int drive) {
   std::vector<Location> locations;
   for (const Hypothesis& h : distinct(found)) locations.push_back(verify(h, places, asked));
   std::stable_sort(locations.begin(), locations.end(),
-                   [](const Location& a, const Location& b) { return a.excess() > b.excess(); });
+                   [](const Location& a, const Location& b) { return a.worth() > b.worth(); });
   judge_location(drive, found.size(), locations);
 }
 
@@ -152,7 +168,7 @@ std::vector<ClosureFinder::Hypothesis> ClosureFinder::distinct(const std::vector
   for (const auto& [company, h] : ranked) {
     if (out.size() == kMostVerified) break;
     const bool there = std::any_of(out.begin(), out.end(),
-                                   [&, h = h](const Hypothesis& o) { return !agreeing({*h}, o).empty(); });
+                                   [&, h = h](const Hypothesis& o) { return agree(*h, o); });
     if (!there) out.push_back(*h);
   }
   return out;
@@ -161,14 +177,26 @@ std::vector<ClosureFinder::Hypothesis> ClosureFinder::distinct(const std::vector
 void ClosureFinder::judge_location(int drive, std::size_t found, const std::vector<Location>& locations) {
   const Location best = locations.empty() ? Location{} : locations[0];
   const int agreeing = static_cast<int>(best.agreeing.size());
-  const int rival = locations.size() < 2 ? 0 : static_cast<int>(locations[1].agreeing.size());
-  if (agreeing < config_.closures.locate_agreeing || agreeing < 2 * best.contradicting || agreeing < 2 * rival) {
+  // What speaks for another place and not for this one.
+  int rival = 0;
+  for (const Location& other : locations) {
+    if (other.astray > kMuchMoreAstray * best.astray) continue;
+    int against = 0;
+    for (const Hypothesis& h : other.agreeing) {
+      against += std::none_of(best.agreeing.begin(), best.agreeing.end(),
+                              [&](const Hypothesis& b) { return agree(h, b); });
+    }
+    rival = std::max(rival, against);
+  }
+  if (agreeing < config_.closures.locate_agreeing || agreeing < 2 * best.contradicting || agreeing < 2 * rival ||
+      best.astray > kMostAstray) {
     throw UserError(fmt::format(
         "{}: shares no place with the map that could be told for sure: {} views of it look like places there; where "
-        "it would fit best {} of its places agree and {} contradict ({} agreeing are asked for), elsewhere {} agree. "
+        "it would fit best {} of its places agree ({} are asked for), {} contradict and {:.0f} % of the walls lie astray; "
+        "elsewhere {} agree as well. "
         "Is it another building? Nothing was written.",
-        set_.drives()[static_cast<std::size_t>(drive)].name, found, agreeing, best.contradicting,
-        config_.closures.locate_agreeing, rival));
+        set_.drives()[static_cast<std::size_t>(drive)].name, found, agreeing,
+        config_.closures.locate_agreeing, best.contradicting, 100.0 * best.astray, rival));
   }
   move_drive(drive, best.T_map_drive);
   for (const Hypothesis& h : best.agreeing) {

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <stdexcept>
 
 #include "core/error.h"
 #include "core/file_io.h"
@@ -62,9 +64,18 @@ struct TwoMaps {
     after = further.build();
   }
 };
+/// Built once; if that fails, every test that needs it fails at once.
 const TwoMaps& two_maps() {
-  static const TwoMaps maps;
-  return maps;
+  static const auto maps = []() -> std::unique_ptr<TwoMaps> {
+    try {
+      return std::make_unique<TwoMaps>();
+    } catch (const std::exception& error) {
+      ADD_FAILURE() << error.what();
+      return nullptr;
+    }
+  }();
+  if (!maps) throw std::runtime_error("the maps could not be built");
+  return *maps;
 }
 
 TEST(MapExtension, ADriveThatBeganElsewhereIsFoundInTheOldMap) {
