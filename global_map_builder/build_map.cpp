@@ -39,7 +39,7 @@ chi2. changes.json holds, for each area, now (occupied or free), x_m, y_m (its m
 
 struct Options {
   std::vector<std::string> bags;
-  std::string out, config, from, json, list, extend;
+  std::string out, config, from, json, list, extend, again;
   int seed = -1;
   bool force = false;
 };
@@ -96,7 +96,8 @@ class DriveEnd {
     const double pause_s = stamp_s - stamp_s_;
     return pause_s >= 0.0 && pause_s < kPause_s &&
            distance_m(T_odom_base, T_odom_base_) < kSlack + kSpeed_mps * pause_s &&
-           std::fabs(normalize_angle_rad(T_odom_base.yaw_rad - T_odom_base_.yaw_rad)) < kSlack + kTurn_radps * pause_s;
+           std::fabs(normalize_angle_rad(T_odom_base.yaw_rad - T_odom_base_.yaw_rad)) <
+               kSlack + kTurn_radps * pause_s;
   }
 
  private:
@@ -148,20 +149,28 @@ Read read_bags(const Options& options, const ObservationReaderConfig& config, co
   return read;
 }
 
+MapRecord load_record(const std::string& directory) {
+  if (!is_map_directory(directory)) throw UserError(directory + ": is not a map directory.");
+  const std::string file = directory + "/drives.bin";
+  if (!std::filesystem::exists(file)) {
+    throw UserError(directory +
+                    ": has no drives.bin, so it can be neither extended nor built again; build it anew from "
+                    "its recordings.");
+  }
+  return read_map_record(file);
+}
+
 /// The map to add to.
 void load_old(const std::string& directory, const BuildMapConfig& config, MapBuilder* builder) {
-  if (!is_map_directory(directory)) throw UserError(directory + ": is not a map directory.");
+  MapRecord record = load_record(directory);
   MapDirectory map = load_map(directory);
   for (const std::string& warning : map.warnings) fmt::print(stderr, "build_map: {}\n", warning);
   if (map.occupancy.geometry.resolution_m != config.surface.resolution_m) {
-    throw UserError(fmt::format("{}: has cells of {} m, but map_builder/surface/resolution_m is {}; they must be equal.",
-                                directory, map.occupancy.geometry.resolution_m, config.surface.resolution_m));
+    throw UserError(
+        fmt::format("{}: has cells of {} m, but map_builder/surface/resolution_m is {}; they must be equal.",
+                    directory, map.occupancy.geometry.resolution_m, config.surface.resolution_m));
   }
-  const std::string file = directory + "/drives.bin";
-  if (!std::filesystem::exists(file)) {
-    throw UserError(directory + ": has no drives.bin, so it cannot be extended; build it anew from its recordings.");
-  }
-  builder->extend(read_map_record(file), std::move(map));
+  builder->extend(std::move(record), std::move(map));
 }
 
 void print_changes(const std::vector<MapChange>& changes) {
@@ -169,8 +178,8 @@ void print_changes(const std::vector<MapChange>& changes) {
   fmt::print(stderr, "{} areas changed{}\n", changes.size(), changes.size() > kShown ? ", the largest:" : "");
   for (std::size_t i = 0; i < std::min(kShown, changes.size()); ++i) {
     const MapChange& c = changes[i];
-    fmt::print(stderr, "  now {}: {:.1f} x {:.1f} m at ({:.2f}, {:.2f})\n", c.occupied ? "occupied" : "free", c.width_m,
-               c.height_m, c.x_m, c.y_m);
+    fmt::print(stderr, "  now {}: {:.1f} x {:.1f} m at ({:.2f}, {:.2f})\n", c.occupied ? "occupied" : "free",
+               c.width_m, c.height_m, c.x_m, c.y_m);
   }
 }
 
@@ -183,12 +192,26 @@ void build_map(const Options& options) {
   const FrontEndConfig front_end = FrontEndConfig::from_file(options.config);
 
   MapBuilder builder(config, mapper);
-  const std::string out = options.out.empty() ? options.extend : options.out;
-  if (out.empty()) throw UserError("--out is required; only --extend can do without, and then replaces the old map.");
+  const std::string old = options.extend.empty() ? options.again : options.extend;
+  const std::string out = options.out.empty() ? old : options.out;
+  if (out.empty()) {
+    throw UserError(
+        "--out is required; only --extend and --again can do without, and then replace the old map.");
+  }
   if (!options.list.empty()) builder.set_list(read_closure_list(options.list));
   if (!options.extend.empty()) load_old(options.extend, config, &builder);
   Stages stages;
-  const Read read = read_bags(options, config.recording, front_end, &builder, &stages);
+  Read read;
+  if (!options.again.empty()) {
+    if (!options.bags.empty() || !options.extend.empty()) {
+      throw UserError("--again takes its drives from the map; give neither BAG nor --extend with it.");
+    }
+    builder.build_again(load_record(options.again));
+    read.source = "drives.bin of " + options.again;
+  } else {
+    if (options.bags.empty()) throw UserError("no BAG was given; see --help.");
+    read = read_bags(options, config.recording, front_end, &builder, &stages);
+  }
   const double read_s = seconds_since(start);
   BuiltMap built = builder.build([&](const char* stage, double fraction) { stages.update(stage, fraction); });
   stages.finish();
@@ -222,13 +245,15 @@ void build_map(const Options& options) {
   const int breaks = json["breaks"];
   if (breaks > 0) {
     fmt::print(stderr,
-               "build_map: the local mapper lost the thread {} times; the map hangs on odometry there.\n", breaks);
+               "build_map: the local mapper lost the thread {} times; the map hangs on odometry there.\n",
+               breaks);
   }
   if (built.old_drives > 0) print_changes(built.changes);
   fmt::print(stderr,
-             "{}: {:.1f} x {:.1f} m, {:.0f} m driven, {} of {} closures, {:.0f} s of recording in {:.1f} s\n", out,
-             json["map"]["width_m"].get<double>(), json["map"]["height_m"].get<double>(), json["path_m"].get<double>(),
-             json["closures"]["accepted"].get<int>(), json["closures"]["found"].get<int>(), read.recording_s, total_s);
+             "{}: {:.1f} x {:.1f} m, {:.0f} m driven, {} of {} closures, {:.0f} s of recording in {:.1f} s\n",
+             out, json["map"]["width_m"].get<double>(), json["map"]["height_m"].get<double>(),
+             json["path_m"].get<double>(), json["closures"]["accepted"].get<int>(),
+             json["closures"]["found"].get<int>(), read.recording_s, total_s);
 }
 
 }  // namespace
@@ -240,12 +265,18 @@ int main(int argc, char** argv) {
       "odometry,\n"
       "TF and button marks. The same bag, configuration and seed give the same map.");
   knav::Options options;
-  app.add_option("BAG", options.bags, "recording; several: parts of a drive, or several drives of one building")->required();
+  app.add_option("BAG", options.bags,
+                 "recording; several: parts of a drive, or several drives of one building");
   app.add_option("--out", options.out, "map directory to write; an older map there is replaced as a whole");
   app.add_option("--extend", options.extend,
                  "map directory to add the drives to, in its frame; replaced if there is no --out");
-  app.add_option("--closures", options.list,
-                 "allow / deny list: an edited closures.yaml, as lies in a map directory or report.html saves");
+  app.add_option(
+      "--again", options.again,
+      "map directory to build again from what it keeps of its drives, without its recordings: with another\n"
+      "list of closures or another configuration of map_builder");
+  app.add_option(
+      "--closures", options.list,
+      "allow / deny list: an edited closures.yaml, as lies in a map directory or report.html saves");
   app.add_option("--config", options.config,
                  "configuration file, as config/default.yaml (sections map_builder, local_mapper)");
   app.add_option("--from", options.from, "what to build from; auto takes what the bag has")

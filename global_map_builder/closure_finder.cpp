@@ -35,7 +35,8 @@ int DriveSet::drive_of(int node) const {
   return static_cast<int>(std::upper_bound(first_.begin(), first_.end(), node) - first_.begin()) - 1;
 }
 
-ClosureFinder::ClosureFinder(const MapBuilderConfig& config, const DriveSet& set) : config_(config), set_(set) {
+ClosureFinder::ClosureFinder(const MapBuilderConfig& config, const DriveSet& set)
+    : config_(config), set_(set) {
   for (int node = 0; node < set.nodes(); ++node) graph_.nodes[node] = set.keyframe(node).T_drive_base;
   for (int drive = 0; drive < set.count(); ++drive) {
     for (PoseGraphEdge edge : set.drives()[static_cast<std::size_t>(drive)].edges) {
@@ -54,7 +55,8 @@ void ClosureFinder::hold(const std::vector<Pose2>& T_map_keyframe, const std::ve
   }
   for (const Closure& closure : closures) {
     if (closure.accepted) {
-      graph_.edges.push_back({closure.from, closure.to, closure.match.T_from_to, closure.match.information, true});
+      graph_.edges.push_back(
+          {closure.from, closure.to, closure.match.T_from_to, closure.match.information, true});
     }
     closures_.push_back(closure);
   }
@@ -157,7 +159,8 @@ bool ClosureFinder::tried(int from, int to, const Pose2& prior) const {
          distance_m(attempt->second.prior, prior) < 0.5 * attempt->second.radius_m;
 }
 
-/// The entry of the list that keeps a closure out: its own, or that of a neighbouring pair with the same mistake.
+/// The entry of the list that keeps a closure out: its own, or that of a neighbouring pair with the same
+/// mistake.
 const ClosureVerdict* ClosureFinder::denied(const Closure& closure) const {
   for (const ClosureVerdict& v : verdicts_) {
     if (!v.allow && v.from == closure.from && v.to == closure.to) return &v;
@@ -201,8 +204,8 @@ bool ClosureFinder::add(Closure closure, const Pose2& prior) {
       match_submaps(config_.closures.match, submap(closure.from), submap(closure.to), prior, window);
   closure.matched = closure.match.accepted;
   if (closure.matched && config_.closures.falsify_share > 0.0) {
-    RandomStream random(config_.closures.falsify_seed, random_stream::kTest, static_cast<std::uint64_t>(closure.from),
-                        static_cast<std::uint64_t>(closure.to));
+    RandomStream random(config_.closures.falsify_seed, random_stream::kTest,
+                        static_cast<std::uint64_t>(closure.from), static_cast<std::uint64_t>(closure.to));
     if (random.uniform() < config_.closures.falsify_share) {
       closure.source = "falsified";
       closure.match.T_from_to =
@@ -269,8 +272,7 @@ void ClosureFinder::allow(int drive) {
     closure.matched = closure.match.accepted;
     closure.match.T_from_to = v.T_from_to;
     const double sd_m = config_.closures.allowed_sd_m, sd_rad = config_.closures.allowed_sd_deg * kPi / 180.0;
-    closure.match.information =
-        Eigen::Vector3d(sd_m, sd_m, sd_rad).cwiseAbs2().cwiseInverse().asDiagonal();
+    closure.match.information = Eigen::Vector3d(sd_m, sd_m, sd_rad).cwiseAbs2().cwiseInverse().asDiagonal();
     graph_.edges.push_back({v.from, v.to, v.T_from_to, closure.match.information, false});
     any = true;
     if (set_.drive_of(v.from) != drive && !placed) {
@@ -370,7 +372,8 @@ void ClosureFinder::settle() {
     if (worst <= limit) break;
     const PoseGraphEdge bad = graph_.edges[worst_edge];
     for (Closure& closure : closures_) {
-      if (!closure.accepted || closure.verdict == "allow" || closure.from != bad.from || closure.to != bad.to) continue;
+      if (!closure.accepted || closure.verdict == "allow" || closure.from != bad.from || closure.to != bad.to)
+        continue;
       closure.accepted = false;
       closure.chi2 = worst;
       closure.reason = fmt::format("contradicts the rest of the graph (chi2 {:.0f})", worst);

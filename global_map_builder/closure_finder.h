@@ -31,7 +31,8 @@ class DriveSet {
   }
   /// Along all drives, one after the other with `gap_m` between; never falls.
   double path_m(int node, double gap_m) const {
-    return keyframe(node).path_m + gap_m * drive_of(node) + path_before_m_[static_cast<std::size_t>(drive_of(node))];
+    return keyframe(node).path_m + gap_m * drive_of(node) +
+           path_before_m_[static_cast<std::size_t>(drive_of(node))];
   }
 
  private:
@@ -91,7 +92,8 @@ class ClosureFinder {
   void search_from(int keyframe, int lowest);
   void allow(int drive);
   void locate(int drive);
-  Location verify(const Hypothesis& hypothesis, const std::vector<int>& places, const std::vector<int>& asked) const;
+  Location verify(const Hypothesis& hypothesis, const std::vector<int>& places,
+                  const std::vector<int>& asked) const;
   std::vector<Hypothesis> distinct(const std::vector<Hypothesis>& found) const;
   void judge_location(int drive, std::size_t found, const std::vector<Location>& locations);
   void move_drive(int drive, const Pose2& T_map_drive);

@@ -53,7 +53,8 @@ ListedClosure read_entry(const YAML::Node& entry, const std::string& where) {
   }
   line.has_transform = entry["x_m"] && entry["y_m"] && entry["yaw_rad"];
   if (line.has_transform) {
-    line.T_from_to = {number(entry, "x_m", where), number(entry, "y_m", where), number(entry, "yaw_rad", where)};
+    line.T_from_to = {number(entry, "x_m", where), number(entry, "y_m", where),
+                      number(entry, "yaw_rad", where)};
   }
   return line;
 }
@@ -77,7 +78,8 @@ std::vector<ListedClosure> read_closure_list(const std::string& path) {
       throw UserError(fmt::format("{}: verdict '{}' must be auto, allow or deny.", where, verdict));
     }
     line.allow = verdict == "allow";
-    if (line.allow && !line.has_transform) throw UserError(where + ": to allow it, x_m, y_m and yaw_rad are needed.");
+    if (line.allow && !line.has_transform)
+      throw UserError(where + ": to allow it, x_m, y_m and yaw_rad are needed.");
     out.push_back(line);
   }
   return out;
@@ -90,8 +92,9 @@ void write_closure_list(const std::string& path, const MapRecord& record) {
         "  - {{drives: [{}, {}], from_stamp_s: {:.6f}, to_stamp_s: {:.6f}, x_m: {:.4f}, y_m: {:.4f}, "
         "yaw_rad: {:.5f}, verdict: {}}}  # {}, {}\n",
         record.drive_of(c.from), record.drive_of(c.to), record.keyframe(c.from).stamp_s,
-        record.keyframe(c.to).stamp_s, c.match.T_from_to.x_m, c.match.T_from_to.y_m, c.match.T_from_to.yaw_rad,
-        c.verdict.empty() ? "auto" : c.verdict, c.source, c.accepted ? "accepted" : "refused: " + c.reason);
+        record.keyframe(c.to).stamp_s, c.match.T_from_to.x_m, c.match.T_from_to.y_m,
+        c.match.T_from_to.yaw_rad, c.verdict.empty() ? "auto" : c.verdict, c.source,
+        c.accepted ? "accepted" : "refused: " + c.reason);
   }
   if (record.closures.empty()) text += "  []\n";
   write_text_atomically(path, text);

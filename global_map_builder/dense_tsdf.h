@@ -56,8 +56,8 @@ class DenseTsdf {
   void add(const TsdfObservation& observation, int first_row, int last_row);
   void add(const TsdfObservation& observation) { add(observation, 0, geometry_.height_cells); }
 
-  /// Takes in what a later drive saw, on the same geometry: where both agree, both count; where they do not, the
-  /// later one holds, if it saw the place well enough.
+  /// Takes in what a later drive saw, on the same geometry: where both agree, both count; where they do not,
+  /// the later one holds, if it saw the place well enough.
   void renew(const DenseTsdf& later);
 
   bool known(std::size_t i) const { return looks_[i] >= min_looks_; }

@@ -50,8 +50,7 @@ std::vector<TsdfObservation> observations_near(const Drive& drive, int keyframe,
   return observations;
 }
 
-void Drive::adjust(const std::vector<Pose2>& T_drive_keyframe,
-                           const std::vector<Eigen::Matrix3d>& added) {
+void Drive::adjust(const std::vector<Pose2>& T_drive_keyframe, const std::vector<Eigen::Matrix3d>& added) {
   const CorrectedDrive corrected(keyframes, T_drive_keyframe);
   for (DriveFrame& frame : frames) frame.T_drive_base = corrected.at(frame.stamp_s, frame.T_drive_base);
   for (StampedPose2& pose : trajectory) pose.T_map_robot = corrected.at(pose.stamp_s, pose.T_map_robot);

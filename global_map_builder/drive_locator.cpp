@@ -52,7 +52,8 @@ bool ClosureFinder::agree(const Hypothesis& h, const Hypothesis& with) const {
   const double way_m = std::fabs(path_m(h.to) - path_m(with.to));
   return distance_m(a, b) <= kAgree_m + config_.closures.search_per_m * way_m &&
          std::fabs(normalize_angle_rad(a.yaw_rad - b.yaw_rad)) <=
-             kAgree_rad + config_.closures.search_angle_deg_per_m * kPi / 180.0 * std::min(way_m, kDriftPath_m);
+             kAgree_rad +
+                 config_.closures.search_angle_deg_per_m * kPi / 180.0 * std::min(way_m, kDriftPath_m);
 }
 
 /// The hypotheses that put the drive where `with` does, one for each place of the drive.
@@ -75,7 +76,8 @@ void ClosureFinder::move_drive(int drive, const Pose2& T_map_drive) {
   }
 }
 
-/// Puts the whole drive where a hypothesis says, and looks at each of its places whether the map there agrees.
+/// Puts the whole drive where a hypothesis says, and looks at each of its places whether the map there
+/// agrees.
 ClosureFinder::Location ClosureFinder::verify(const Hypothesis& h, const std::vector<int>& places,
                                               const std::vector<int>& asked) const {
   const ClosureConfig& c = config_.closures;
@@ -96,17 +98,18 @@ ClosureFinder::Location ClosureFinder::verify(const Hypothesis& h, const std::ve
     const Pose2 T_place_here = graph_.nodes.at(place).inverse() * here;
     if (distance_m(T_place_here, {}) > 1.5 * c.locate_spacing_m) return;
     const double way_m = std::fabs(path_m(asked[i]) - path_m(h.to));
-    const MatchWindow window{kAgree_m + c.search_per_m * way_m,
-                             kAgree_rad + c.search_angle_deg_per_m * kPi / 180.0 * std::min(way_m, kDriftPath_m)};
+    const MatchWindow window{
+        kAgree_m + c.search_per_m * way_m,
+        kAgree_rad + c.search_angle_deg_per_m * kPi / 180.0 * std::min(way_m, kDriftPath_m)};
     Look& look = looks[i];
     look.match = {place, asked[i], {}, {}};
-    look.match.match = match_submaps(c.match, *submaps_.at(place), *submaps_.at(asked[i]), T_place_here, window);
+    look.match.match =
+        match_submaps(c.match, *submaps_.at(place), *submaps_.at(asked[i]), T_place_here, window);
     const MatchResult& match = look.match.match;
-    look.match.T_map_drive =
-        graph_.nodes.at(place) * match.T_from_to * graph_.nodes.at(asked[i]).inverse();
+    look.match.T_map_drive = graph_.nodes.at(place) * match.T_from_to * graph_.nodes.at(asked[i]).inverse();
     look.agrees = match.accepted;
-    look.contradicts = !match.accepted && match.overlap >= c.match.min_overlap &&
-                       match.agreement < c.match.min_agreement;
+    look.contradicts =
+        !match.accepted && match.overlap >= c.match.min_overlap && match.agreement < c.match.min_agreement;
   });
   Location location;
   location.T_map_drive = h.T_map_drive;
@@ -124,8 +127,8 @@ ClosureFinder::Location ClosureFinder::verify(const Hypothesis& h, const std::ve
 }
 
 /// Lays places along the drive on all places of the drives before, in any direction. A single match may be a
-/// look-alike. Each place where matches would put the drive is therefore tried with the whole drive: the right
-/// one is agreed to all along it.
+/// look-alike. Each place where matches would put the drive is therefore tried with the whole drive: the
+/// right one is agreed to all along it.
 void ClosureFinder::locate(int drive) {
   const int first = set_.first(drive), last = set_.first(drive + 1);
   const bool joined = std::any_of(closures_.begin(), closures_.end(), [&](const Closure& c) {
@@ -148,8 +151,9 @@ void ClosureFinder::locate(int drive) {
     });
     for (std::size_t k = 0; k < places.size(); ++k) {
       if (!matches[k].accepted) continue;
-      found.push_back({places[k], asked[i], matches[k],
-                       graph_.nodes.at(places[k]) * matches[k].T_from_to * graph_.nodes.at(asked[i]).inverse()});
+      found.push_back(
+          {places[k], asked[i], matches[k],
+           graph_.nodes.at(places[k]) * matches[k].T_from_to * graph_.nodes.at(asked[i]).inverse()});
     }
   }
   std::vector<Location> locations;
@@ -163,12 +167,13 @@ void ClosureFinder::locate(int drive) {
 std::vector<ClosureFinder::Hypothesis> ClosureFinder::distinct(const std::vector<Hypothesis>& found) const {
   std::vector<std::pair<std::size_t, const Hypothesis*>> ranked;
   for (const Hypothesis& h : found) ranked.emplace_back(agreeing(found, h).size(), &h);
-  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<Hypothesis> out;
   for (const auto& [company, h] : ranked) {
     if (out.size() == kMostVerified) break;
-    const bool there = std::any_of(out.begin(), out.end(),
-                                   [&, h = h](const Hypothesis& o) { return agree(*h, o); });
+    const bool there =
+        std::any_of(out.begin(), out.end(), [&, h = h](const Hypothesis& o) { return agree(*h, o); });
     if (!there) out.push_back(*h);
   }
   return out;
@@ -188,15 +193,17 @@ void ClosureFinder::judge_location(int drive, std::size_t found, const std::vect
     }
     rival = std::max(rival, against);
   }
-  if (agreeing < config_.closures.locate_agreeing || agreeing < 2 * best.contradicting || agreeing < 2 * rival ||
-      best.astray > kMostAstray) {
-    throw UserError(fmt::format(
-        "{}: shares no place with the map that could be told for sure: {} views of it look like places there; where "
-        "it would fit best {} of its places agree ({} are asked for), {} contradict and {:.0f} % of the walls lie astray; "
-        "elsewhere {} agree as well. "
-        "Is it another building? Nothing was written.",
-        set_.drives()[static_cast<std::size_t>(drive)].name, found, agreeing,
-        config_.closures.locate_agreeing, best.contradicting, 100.0 * best.astray, rival));
+  if (agreeing < config_.closures.locate_agreeing || agreeing < 2 * best.contradicting ||
+      agreeing < 2 * rival || best.astray > kMostAstray) {
+    throw UserError(
+        fmt::format("{}: shares no place with the map that could be told for sure: {} views of it look like "
+                    "places there; where "
+                    "it would fit best {} of its places agree ({} are asked for), {} contradict and {:.0f} % "
+                    "of the walls lie astray; "
+                    "elsewhere {} agree as well. "
+                    "Is it another building? Nothing was written.",
+                    set_.drives()[static_cast<std::size_t>(drive)].name, found, agreeing,
+                    config_.closures.locate_agreeing, best.contradicting, 100.0 * best.astray, rival));
   }
   move_drive(drive, best.T_map_drive);
   for (const Hypothesis& h : best.agreeing) {

@@ -39,8 +39,8 @@ void DriveRecorder::take(const Observation& observation, const Pose2& T_base_sen
   if (drive_.trajectory.empty()) {
     T_drive_local_ = result.T_local_base.inverse();
   } else if (result.epoch != epoch_) {
-    const Pose2 T_drive_base =
-        drive_.trajectory.back().T_map_robot * (drive_.odometry.back().T_map_robot.inverse() * result.T_odom_base);
+    const Pose2 T_drive_base = drive_.trajectory.back().T_map_robot *
+                               (drive_.odometry.back().T_map_robot.inverse() * result.T_odom_base);
     T_drive_local_ = T_drive_base * result.T_local_base.inverse();
     break_pending_ = true;
     ++drive_.breaks;
@@ -66,7 +66,8 @@ void DriveRecorder::take(const Observation& observation, const Pose2& T_base_sen
   const bool usable = result.outcome != FrameOutcome::kSuspicious;
   if (usable &&
       (drive_.frames.empty() || result.stamp_s - drive_.frames.back().stamp_s >= config_.frame_period_s ||
-       moved(drive_.frames.back().T_drive_base, T_drive_base, config_.frame_distance_m, config_.frame_angle_deg))) {
+       moved(drive_.frames.back().T_drive_base, T_drive_base, config_.frame_distance_m,
+             config_.frame_angle_deg))) {
     drive_.frames.push_back(
         {result.stamp_s, path_m_, T_drive_base, result.T_odom_base, T_base_sensor, observation});
   }

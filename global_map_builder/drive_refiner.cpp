@@ -22,8 +22,7 @@ MatchConfig match_config() {
 }  // namespace
 
 std::vector<PoseGraphEdge> refine_drive(const RefinementConfig& config, const SurfaceConfig& surface,
-                                        const Drive& drive,
-                                        const std::function<void(double)>& progress) {
+                                        const Drive& drive, const std::function<void(double)>& progress) {
   std::vector<PoseGraphEdge> edges;
   if (!config.enabled) return edges;
   SurfaceConfig near = surface;

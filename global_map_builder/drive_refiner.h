@@ -13,7 +13,6 @@ namespace knav {
 /// what was seen round the other. The particle filter's estimate wavers by its sampling noise; these edges
 /// take that out, and being longer than a step they keep it from adding up.
 std::vector<PoseGraphEdge> refine_drive(const RefinementConfig& config, const SurfaceConfig& surface,
-                                        const Drive& drive,
-                                        const std::function<void(double)>& progress);
+                                        const Drive& drive, const std::function<void(double)>& progress);
 
 }  // namespace knav

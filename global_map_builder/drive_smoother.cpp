@@ -86,8 +86,7 @@ Eigen::Vector3d step_sd() { return {kStepPosition_sd_m, kStepPosition_sd_m, kSte
 }  // namespace
 
 int smooth_drive(const RefinementConfig& config, const GraphOptimizerConfig& graph_config,
-                 const SurfaceConfig& surface, Drive* drive,
-                 const std::function<void(double)>& progress) {
+                 const SurfaceConfig& surface, Drive* drive, const std::function<void(double)>& progress) {
   const std::vector<PoseGraphEdge> steps = drive->edges;
   if (!config.enabled || steps.size() < kMinSteps) return 0;
   const std::vector<Deviation> deviations = deviations_of(*drive);

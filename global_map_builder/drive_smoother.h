@@ -15,7 +15,6 @@ namespace knav {
 /// apart, coarse but free of drift.
 /// @return the number of steps found to be jumps
 int smooth_drive(const RefinementConfig& config, const GraphOptimizerConfig& graph,
-                 const SurfaceConfig& surface, Drive* drive,
-                 const std::function<void(double)>& progress);
+                 const SurfaceConfig& surface, Drive* drive, const std::function<void(double)>& progress);
 
 }  // namespace knav

@@ -48,8 +48,8 @@ void extract(const std::string& in, const std::string& out, const std::string& c
     };
     callbacks.progress = [&](double fraction) { progress.update(fraction); };
     reader.read(callbacks);
-    bag.for_each({config.odometry_topic, "tf", "tf_static", config.mark_topic, config.joy_topic, "ground_truth",
-                  config.camera_info_topic},
+    bag.for_each({config.odometry_topic, "tf", "tf_static", config.mark_topic, config.joy_topic,
+                  "ground_truth", config.camera_info_topic},
                  [&](const rosbag::MessageInstance& m, double) {
                    written.write(m.getTopic(), m.getTime(), m, m.getConnectionHeader());
                  });
@@ -64,8 +64,10 @@ void extract(const std::string& in, const std::string& out, const std::string& c
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Turns the raw depth of a recording into depth profiles (calibration, rolling shutter and floor as in the\n"
-      "configuration) and keeps odometry, TF, marks and ground truth: to archive a drive, or to build from it often.");
+      "Turns the raw depth of a recording into depth profiles (calibration, rolling shutter and floor as in "
+      "the\n"
+      "configuration) and keeps odometry, TF, marks and ground truth: to archive a drive, or to build from "
+      "it often.");
   std::string in, out, config;
   app.add_option("BAG", in, "recording with depth images")->required();
   app.add_option("OUT", out, "recording to write")->required();

@@ -38,7 +38,8 @@ struct GraphOptimizerSummary {
 };
 
 /// Moves the nodes to where sum e' information e is least (Ceres, Levenberg-Marquardt on SE(2)). The lowest
-/// node of every connected part stays where it is, and so do the held ones (without chordal start, then). UserError if an edge names a missing node.
+/// node of every connected part stays where it is, and so do the held ones (without chordal start, then).
+/// UserError if an edge names a missing node.
 GraphOptimizerSummary optimize(const GraphOptimizerConfig& config, PoseGraph* graph);
 
 /// Rotations first: the chordal relaxation of all headings (one sparse linear solve over unit complex

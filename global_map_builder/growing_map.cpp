@@ -9,7 +9,8 @@ namespace {
 
 constexpr double kMargin_m = 12.0;  // room kept on every side, so that the grid is seldom laid out anew
 
-std::vector<TsdfObservation> observations_of(const Drive& drive, std::size_t first, const ObservationLimits& limits) {
+std::vector<TsdfObservation> observations_of(const Drive& drive, std::size_t first,
+                                             const ObservationLimits& limits) {
   std::vector<TsdfObservation> out;
   for (std::size_t i = first; i < drive.frames.size(); ++i) {
     const DriveFrame& frame = drive.frames[i];

@@ -11,16 +11,44 @@ double KeyboardDrive::approach(double from, double to, double most) const {
 void KeyboardDrive::key(double now_s, char key) {
   const auto press = [now_s](Axis* axis, int direction) { *axis = {direction, now_s}; };
   switch (key) {
-    case 'w': case 'W': press(&forward_, 1); break;
-    case 's': case 'S': press(&forward_, -1); break;
-    case 'a': case 'A': press(&turn_, 1); break;
-    case 'd': case 'D': press(&turn_, -1); break;
-    case ' ': forward_ = turn_ = {}; speeds_ = {}; break;
-    case 'm': case 'M': ++marks_; break;
-    case '+': case '=': scale_ = std::min(2.0, scale_ + 0.1); break;
-    case '-': scale_ = std::max(0.1, scale_ - 0.1); break;
-    case 'q': case 'Q': case '\x03': ended_ = true; break;
-    default: break;
+    case 'w':
+    case 'W':
+      press(&forward_, 1);
+      break;
+    case 's':
+    case 'S':
+      press(&forward_, -1);
+      break;
+    case 'a':
+    case 'A':
+      press(&turn_, 1);
+      break;
+    case 'd':
+    case 'D':
+      press(&turn_, -1);
+      break;
+    case ' ':
+      forward_ = turn_ = {};
+      speeds_ = {};
+      break;
+    case 'm':
+    case 'M':
+      ++marks_;
+      break;
+    case '+':
+    case '=':
+      scale_ = std::min(2.0, scale_ + 0.1);
+      break;
+    case '-':
+      scale_ = std::max(0.1, scale_ - 0.1);
+      break;
+    case 'q':
+    case 'Q':
+    case '\x03':
+      ended_ = true;
+      break;
+    default:
+      break;
   }
 }
 
@@ -44,7 +72,9 @@ KeyboardDrive::Speeds KeyboardDrive::update(double now_s, const std::string& byt
   }
   const double step_s = std::clamp(now_s - last_s_, 0.0, 0.2);
   last_s_ = now_s;
-  const auto held = [&](const Axis& axis) { return now_s - axis.pressed_s < config_.hold_s ? axis.direction : 0; };
+  const auto held = [&](const Axis& axis) {
+    return now_s - axis.pressed_s < config_.hold_s ? axis.direction : 0;
+  };
   const double forward = held(forward_) * config_.speed_mps * scale_;
   const double turn = held(turn_) * config_.turn_radps * scale_;
   speeds_.forward_mps = approach(speeds_.forward_mps, forward, config_.acceleration_mps2 * step_s);

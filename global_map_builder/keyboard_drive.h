@@ -19,12 +19,14 @@ struct KeyboardDriveConfig {
     v.number("acceleration_mps2", acceleration_mps2, 0.05, 10, "m/s^2", "Speeds change no faster.");
     v.number("turn_acceleration_radps2", turn_acceleration_radps2, 0.05, 20, "rad/s^2", "Likewise.");
     v.number("hold_s", hold_s, 0.1, 5, "s",
-             "The robot stops so long after the last key: a terminal repeats a held key, first after about 0.5 s.");
+             "The robot stops so long after the last key: a terminal repeats a held key, first after about "
+             "0.5 s.");
   }
   std::vector<std::string> validate() const { return {}; }
 };
 
-/// From a terminal's bytes to speeds: arrows or w a s d drive while held, space stops at once, m marks a place,
+/// From a terminal's bytes to speeds: arrows or w a s d drive while held, space stops at once, m marks a
+/// place,
 /// + and - change the speeds by a tenth, q or Ctrl-C ends.
 class KeyboardDrive {
  public:

@@ -19,7 +19,8 @@ class RawTerminal {
  public:
   RawTerminal() {
     if (isatty(STDIN_FILENO) == 0 || tcgetattr(STDIN_FILENO, &before_) != 0) {
-      throw UserError("keys can only be read from a terminal; under roslaunch add launch-prefix=\"xterm -e\".");
+      throw UserError(
+          "keys can only be read from a terminal; under roslaunch add launch-prefix=\"xterm -e\".");
     }
     termios raw = before_;
     raw.c_lflag &= static_cast<tcflag_t>(~(ICANON | ECHO));
@@ -48,7 +49,8 @@ void drive() {
   KeyboardDrive keyboard(read_parameters<KeyboardDriveConfig>(ros::NodeHandle("~")));
   ros::Publisher speeds = node.advertise<geometry_msgs::Twist>("cmd_vel", 1);
   ros::Publisher marks = node.advertise<std_msgs::Empty>("mark_place", 10);
-  fmt::print("arrows or w a s d: drive while held   space: stop   m: mark this place   + -: speed   q: end\n");
+  fmt::print(
+      "arrows or w a s d: drive while held   space: stop   m: mark this place   + -: speed   q: end\n");
   int marked = 0;
   bool moving = false;
   while (ros::ok() && !keyboard.ended() && !interrupted()) {
@@ -80,8 +82,10 @@ void drive() {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "keyboard_teleop", ros::init_options::NoSigintHandler);
   CLI::App app(
-      "Drives a robot from a terminal: publishes cmd_vel (geometry_msgs/Twist) while a key is held, and mark_place\n"
-      "(std_msgs/Empty) for the map builder. Speeds are private parameters (_speed_mps:=0.3); topics can be remapped.");
+      "Drives a robot from a terminal: publishes cmd_vel (geometry_msgs/Twist) while a key is held, and "
+      "mark_place\n"
+      "(std_msgs/Empty) for the map builder. Speeds are private parameters (_speed_mps:=0.3); topics can be "
+      "remapped.");
   app.allow_extras();
   return knav::run_command(app, argc, argv, [] { knav::drive(); });
 }

@@ -5,8 +5,8 @@
 
 namespace knav {
 
-/// The node that builds a map while the robot drives. How it builds and how it maps are the sections map_builder
-/// and local_mapper, as for build_map.
+/// The node that builds a map while the robot drives. How it builds and how it maps are the sections
+/// map_builder and local_mapper, as for build_map.
 struct LiveMapBuilderConfig {
   std::string directory;
   bool build_at_end = true;

@@ -1,5 +1,6 @@
 // Builds a map while the robot is driven: the local mapper runs along, `growing_map` shows what there is, and
-// at the end (service finish_mapping, or when the node ends) the loops are closed and the directory is written.
+// at the end (service finish_mapping, or when the node ends) the loops are closed and the directory is
+// written.
 #include <kinect_nav/DepthProfile.h>
 #include <nav_msgs/OccupancyGrid.h>
 #include <nav_msgs/Odometry.h>
@@ -57,13 +58,14 @@ class LiveMapBuilderNodelet : public NodeletBase {
     map_publisher_ = node.advertise<nav_msgs::OccupancyGrid>("growing_map", 1, true);
     marks_publisher_ = node.advertise<std_msgs::UInt32>("marks_counted", 1, true);
     finish_ = node.advertiseService("finish_mapping", &LiveMapBuilderNodelet::on_finish, this);
-    subscribers_ = {
-        node.subscribe("odom", 500, &LiveMapBuilderNodelet::on_odometry, this, ros::TransportHints().tcpNoDelay()),
-        node.subscribe("depth_profile", 60, &LiveMapBuilderNodelet::on_profile, this),
-        node.subscribe("scan_in", 60, &LiveMapBuilderNodelet::on_scan, this),
-        node.subscribe("mark_place", 10, &LiveMapBuilderNodelet::on_mark, this),
-        node.subscribe("joy", 50, &LiveMapBuilderNodelet::on_joy, this)};
-    timer_ = node.createWallTimer(ros::WallDuration(config_.map_period_s), &LiveMapBuilderNodelet::on_timer, this);
+    subscribers_ = {node.subscribe("odom", 500, &LiveMapBuilderNodelet::on_odometry, this,
+                                   ros::TransportHints().tcpNoDelay()),
+                    node.subscribe("depth_profile", 60, &LiveMapBuilderNodelet::on_profile, this),
+                    node.subscribe("scan_in", 60, &LiveMapBuilderNodelet::on_scan, this),
+                    node.subscribe("mark_place", 10, &LiveMapBuilderNodelet::on_mark, this),
+                    node.subscribe("joy", 50, &LiveMapBuilderNodelet::on_joy, this)};
+    timer_ =
+        node.createWallTimer(ros::WallDuration(config_.map_period_s), &LiveMapBuilderNodelet::on_timer, this);
     publish_marks();
     NODELET_INFO("Mapping into %s; call %s when the drive is over.", config_.directory.c_str(),
                  finish_.getService().c_str());
@@ -107,7 +109,8 @@ class LiveMapBuilderNodelet : public NodeletBase {
     process_pending();
     while (static_cast<int>(pending_.size()) > config_.frames_waiting) {
       pending_.pop_front();
-      NODELET_WARN_THROTTLE(10.0, "Frames are dropped: odometry on '%s' does not keep up with them, or is missing.",
+      NODELET_WARN_THROTTLE(10.0,
+                            "Frames are dropped: odometry on '%s' does not keep up with them, or is missing.",
                             subscribers_.front().getTopic().c_str());
     }
   }
@@ -117,10 +120,10 @@ class LiveMapBuilderNodelet : public NodeletBase {
     while (!pending_.empty() && pending_.front().stamp_s <= odometry_s_) {
       const Pending frame = pending_.front();
       pending_.pop_front();
-      const std::string& sensor = frame.profile ? frame.profile->header.frame_id : frame.scan->header.frame_id;
+      const std::string& sensor =
+          frame.profile ? frame.profile->header.frame_id : frame.scan->header.frame_id;
       try {
-        const geometry_msgs::Transform T =
-            tf_.lookupTransform(base_frame_, sensor, ros::Time(0)).transform;
+        const geometry_msgs::Transform T = tf_.lookupTransform(base_frame_, sensor, ros::Time(0)).transform;
         if (frame.profile) {
           profile_from(*frame.profile, &profile_);
           builder_->add(profile_, planar_camera_pose(T));
@@ -129,8 +132,8 @@ class LiveMapBuilderNodelet : public NodeletBase {
           builder_->add(scan_, pose2_from(T));
         }
       } catch (const tf2::TransformException& error) {
-        NODELET_WARN_THROTTLE(10.0, "No transform from '%s' to '%s' yet, frames are not used: %s", sensor.c_str(),
-                              base_frame_.c_str(), error.what());
+        NODELET_WARN_THROTTLE(10.0, "No transform from '%s' to '%s' yet, frames are not used: %s",
+                              sensor.c_str(), base_frame_.c_str(), error.what());
       } catch (const UserError& error) {
         NODELET_WARN_THROTTLE(10.0, "%s", error.what());
       }
@@ -146,7 +149,8 @@ class LiveMapBuilderNodelet : public NodeletBase {
     occupancy_message(grid, &message);
     // The grid lies in the drive's frame; odometry sees that turned and moved.
     const Pose2 T_odom_drive = drive.frames.back().T_odom_base * drive.frames.back().T_drive_base.inverse();
-    message.info.origin = pose_message(T_odom_drive * Pose2{grid.geometry.origin_x_m, grid.geometry.origin_y_m, 0.0});
+    message.info.origin =
+        pose_message(T_odom_drive * Pose2{grid.geometry.origin_x_m, grid.geometry.origin_y_m, 0.0});
     message.header.frame_id = config_.odom_frame;
     message.header.stamp.fromSec(drive.frames.back().stamp_s);
     map_publisher_.publish(message);
@@ -171,8 +175,8 @@ class LiveMapBuilderNodelet : public NodeletBase {
       figures["marks"] = marks_;
       built.map.about["made_by"] = "live_map_builder";
       write_built_map(config_.directory, figures, false, &built);
-      *message = config_.directory + ": written, " + figures["closures"]["accepted"].dump() + " closures, checksum " +
-                 built.map.checksum;
+      *message = config_.directory + ": written, " + figures["closures"]["accepted"].dump() +
+                 " closures, checksum " + built.map.checksum;
       NODELET_INFO("%s", message->c_str());
       return true;
     } catch (const std::exception& error) {

@@ -48,12 +48,18 @@ class MapBuilder {
 
   /// A map to add to: its frame and its drives stay as they are. Before the first observation.
   void extend(MapRecord record, MapDirectory map);
+  /// The drives of a record instead of observations: closures and map are made anew.
+  void build_again(MapRecord record) { drives_ = std::move(record.drives); }
   /// What follows is another drive, that began anywhere, at any time. Needed before the second only.
   void begin_drive(const std::string& name);
 
   // In the order of stamps, odometry a little ahead of the observations.
-  void add_odometry(double stamp_s, const Pose2& T_odom_base) { recorder_->add_odometry(stamp_s, T_odom_base); }
-  void add(const DepthProfile& profile, const Pose2& T_base_camera) { recorder_->add(profile, T_base_camera); }
+  void add_odometry(double stamp_s, const Pose2& T_odom_base) {
+    recorder_->add_odometry(stamp_s, T_odom_base);
+  }
+  void add(const DepthProfile& profile, const Pose2& T_base_camera) {
+    recorder_->add(profile, T_base_camera);
+  }
   void add(const RangeScan& scan, const Pose2& T_base_sensor) { recorder_->add(scan, T_base_sensor); }
   /// The button: the robot stands at a marked place. Marks of one place close a loop.
   void mark(double stamp_s) { recorder_->mark(stamp_s); }

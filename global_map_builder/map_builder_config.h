@@ -99,12 +99,14 @@ struct ClosureConfig {
              "wrong.");
     v.integer("passes", passes, 1, 5, "",
               "Passes over the drive; each starts from the graph that the last one left.");
-    v.number("locate_spacing_m", locate_spacing_m, 0.5, 50, "m",
-             "A further drive is sought among local maps of the earlier ones every so far, with its own every "
-             "twice as far.");
+    v.number(
+        "locate_spacing_m", locate_spacing_m, 0.5, 50, "m",
+        "A further drive is sought among local maps of the earlier ones every so far, with its own every "
+        "so far too.");
     v.integer("locate_agreeing", locate_agreeing, 2, 100, "",
               "So many of its places must agree on where it lies.");
-    v.number("allowed_sd_m", allowed_sd_m, 0.001, 5, "m", "How well a closure of the user's list is trusted (sd).");
+    v.number("allowed_sd_m", allowed_sd_m, 0.001, 5, "m",
+             "How well a closure of the user's list is trusted (sd).");
     v.number("allowed_sd_deg", allowed_sd_deg, 0.01, 90, "deg", "Likewise its heading.");
     v.number("falsify_share", falsify_share, 0, 1, "",
              "For measuring robustness: this share of the closures found is moved by metres on purpose.");

@@ -8,7 +8,7 @@ namespace knav {
 
 /// An area that is not as it was.
 struct MapChange {
-  bool occupied = false;  ///< now; false: it became free
+  bool occupied = false;                 ///< now; false: it became free
   double x_m = 0.0, y_m = 0.0;           ///< its middle, in the map
   double width_m = 0.0, height_m = 0.0;  ///< of the box round it, along x and y
   double wall_m = 0.0;                   ///< about the length of surface that came or went

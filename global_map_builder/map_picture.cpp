@@ -112,8 +112,10 @@ std::vector<unsigned char> changes_picture(const BuiltMap& built) {
     constexpr double kMargin_m = 0.15;
     const double w = 0.5 * change.width_m + kMargin_m, h = 0.5 * change.height_m + kMargin_m;
     const cv::Scalar color = change.occupied ? cv::Scalar(0, 0, 230) : cv::Scalar(230, 80, 0);
-    const Pose2 corners[] = {{change.x_m - w, change.y_m - h, 0}, {change.x_m + w, change.y_m - h, 0},
-                             {change.x_m + w, change.y_m + h, 0}, {change.x_m - w, change.y_m + h, 0}};
+    const Pose2 corners[] = {{change.x_m - w, change.y_m - h, 0},
+                             {change.x_m + w, change.y_m - h, 0},
+                             {change.x_m + w, change.y_m + h, 0},
+                             {change.x_m - w, change.y_m + h, 0}};
     for (int i = 0; i < 4; ++i) canvas.line(corners[i], corners[(i + 1) % 4], color, 2);
   }
   canvas.scale_bar();
@@ -135,7 +137,8 @@ std::vector<unsigned char> closure_thumbnail(const Closure& closure) {
   for (const Point2& p : later) cover(p.x_m, p.y_m);
   const double scale = (kSide - 8) / std::max({high_x - low_x, high_y - low_y, 1.0});
   const auto dot = [&](double x, double y, const cv::Scalar& color) {
-    const cv::Point at(static_cast<int>(4 + (x - low_x) * scale), static_cast<int>(kSide - 4 - (y - low_y) * scale));
+    const cv::Point at(static_cast<int>(4 + (x - low_x) * scale),
+                       static_cast<int>(kSide - 4 - (y - low_y) * scale));
     cv::rectangle(image, at, at + cv::Point(1, 1), color, cv::FILLED);
   };
   for (const SurfacePoint& p : closure.from_points) dot(p.x_m, p.y_m, {0, 0, 0});

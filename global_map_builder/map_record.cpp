@@ -116,7 +116,8 @@ void lengths(Archive& a, std::vector<float>& values, double unit_m) {
       if (std::isinf(v)) {
         code = kInfinite;
       } else if (!std::isnan(v)) {
-        code = static_cast<std::uint16_t>(std::clamp(std::lround(v / unit_m), 0L, static_cast<long>(kLargest)));
+        code =
+            static_cast<std::uint16_t>(std::clamp(std::lround(v / unit_m), 0L, static_cast<long>(kLargest)));
       }
     }
     a.plain(code);
@@ -222,8 +223,8 @@ void closure(Archive& a, Closure& c) {
   a.plain(c.chi2);
   pose(a, c.match.T_from_to);
   matrix(a, c.match.information);
-  for (double* v : {&c.match.score, &c.match.overlap, &c.match.agreement, &c.match.residual_m, &c.match.surface_m,
-                    &c.match.rival}) {
+  for (double* v : {&c.match.score, &c.match.overlap, &c.match.agreement, &c.match.residual_m,
+                    &c.match.surface_m, &c.match.rival}) {
     a.plain(*v);
   }
 }
@@ -278,14 +279,14 @@ void write_map_record(const std::string& path, const MapRecord& given) {
   uLongf packed_size = compressBound(static_cast<uLong>(bytes.size()));
   std::string packed(packed_size, '\0');
   // Level 1: a third of the time of level 6 for a tenth more bytes.
-  if (compress2(reinterpret_cast<Bytef*>(packed.data()), &packed_size, reinterpret_cast<const Bytef*>(bytes.data()),
-                static_cast<uLong>(bytes.size()), 1) != Z_OK) {
+  if (compress2(reinterpret_cast<Bytef*>(packed.data()), &packed_size,
+                reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uLong>(bytes.size()), 1) != Z_OK) {
     throw UserError(path + ": cannot be compressed; is the memory full?");
   }
   packed.resize(packed_size);
   const std::uint64_t length = bytes.size();
-  const auto sum = static_cast<std::uint32_t>(
-      crc32_z(0, reinterpret_cast<const Bytef*>(packed.data()), packed.size()));
+  const auto sum =
+      static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(packed.data()), packed.size()));
   std::string file(kMagic, sizeof kMagic);
   file.append(reinterpret_cast<const char*>(&kVersion), sizeof kVersion);
   file.append(reinterpret_cast<const char*>(&sum), sizeof sum);
@@ -312,7 +313,8 @@ MapRecord read_map_record(const std::string& path) {
   if (crc32_z(0, packed, packed_size) != sum || length > kMaxBytes) throw damaged;
   std::string bytes(length, '\0');
   uLongf size = static_cast<uLongf>(length);
-  if (uncompress(reinterpret_cast<Bytef*>(bytes.data()), &size, packed, static_cast<uLong>(packed_size)) != Z_OK ||
+  if (uncompress(reinterpret_cast<Bytef*>(bytes.data()), &size, packed, static_cast<uLong>(packed_size)) !=
+          Z_OK ||
       size != length) {
     throw damaged;
   }

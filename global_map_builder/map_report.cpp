@@ -34,11 +34,20 @@ std::string escaped(const std::string& text) {
   std::string out;
   for (const char c : text) {
     switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
     }
   }
   return out;
@@ -78,25 +87,31 @@ std::string row(const MapRecord& record, const Closure& c, std::size_t number, b
       "drives: [{}, {}], from_stamp_s: {:.6f}, to_stamp_s: {:.6f}, x_m: {:.4f}, y_m: {:.4f}, yaw_rad: {:.5f}",
       record.drive_of(c.from), record.drive_of(c.to), from.stamp_s, to.stamp_s, c.match.T_from_to.x_m,
       c.match.T_from_to.y_m, c.match.T_from_to.yaw_rad);
-  const std::string shown =
-      with_picture && !c.from_points.empty() ? picture(closure_thumbnail(c), fmt::format("closure {}", number)) : "";
+  const std::string shown = with_picture && !c.from_points.empty()
+                                ? picture(closure_thumbnail(c), fmt::format("closure {}", number))
+                                : "";
   const auto when = [&](int keyframe, const Keyframe& k) {
-    return fmt::format("drive {}, {:.1f} s, {:.1f} m", record.drive_of(keyframe), k.stamp_s - start_s, k.path_m);
+    return fmt::format("drive {}, {:.1f} s, {:.1f} m", record.drive_of(keyframe), k.stamp_s - start_s,
+                       k.path_m);
   };
   return fmt::format(
-      "<tr class=\"{}\" data-entry=\"{}\"><td>{}</td><td class=t>{}</td><td class=t>{}</td><td class=t>{}</td>"
-      "<td>{:.3f}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.1f}</td><td>{:.2f}</td><td>{:.1f}</td>"
+      "<tr class=\"{}\" data-entry=\"{}\"><td>{}</td><td class=t>{}</td><td class=t>{}</td><td "
+      "class=t>{}</td>"
+      "<td>{:.3f}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.1f}</td><td>{:.2f}</td><td>{:.1f}</"
+      "td>"
       "<td class=t>{}</td><td class=t>{}</td><td>{}</td></tr>\n",
-      c.accepted ? "yes" : "no", entry, number, c.source, when(c.from, from), when(c.to, to), c.match.residual_m,
-      c.match.score, c.match.overlap, c.match.agreement, c.match.surface_m, c.match.rival, c.chi2,
-      c.accepted ? "accepted" : "refused: " + escaped(c.reason), choice(c.verdict), shown);
+      c.accepted ? "yes" : "no", entry, number, c.source, when(c.from, from), when(c.to, to),
+      c.match.residual_m, c.match.score, c.match.overlap, c.match.agreement, c.match.surface_m, c.match.rival,
+      c.chi2, c.accepted ? "accepted" : "refused: " + escaped(c.reason), choice(c.verdict), shown);
 }
 
 std::string changes_section(const BuiltMap& built) {
   std::string text = "<h2>What changed</h2>\n<p>Red came, blue went.</p>\n";
   text += fmt::format("<figure><img class=map alt=\"changes\" src=\"data:image/png;base64,{}\"></figure>\n",
                       base64(changes_picture(built)));
-  text += "<table><tr><th class=t>now</th><th>x [m]</th><th>y [m]</th><th>size [m]</th><th>surface [m]</th></tr>\n";
+  text +=
+      "<table><tr><th class=t>now</th><th>x [m]</th><th>y [m]</th><th>size [m]</th><th>surface "
+      "[m]</th></tr>\n";
   for (const MapChange& change : built.changes) {
     text += fmt::format(
         "<tr><td class=t>{}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.2f} x {:.2f}</td><td>{:.2f}</td></tr>\n",
@@ -115,23 +130,30 @@ void write_map_report(const std::string& path, const BuiltMap& built, const std:
   for (const auto& [name, value] : figures) {
     text += fmt::format("<tr><th class=t>{}</th><td class=t>{}</td></tr>\n", escaped(name), escaped(value));
   }
-  text += "</table>\n<h2>The map</h2>\n<p>The drive from blue to red; closures green, refused ones magenta. Doubled "
-          "walls mean a missing or a wrong closure.</p>\n<div class=pair>\n";
+  text +=
+      "</table>\n<h2>The map</h2>\n<p>The drive from blue to red; closures green, refused ones magenta. "
+      "Doubled "
+      "walls mean a missing or a wrong closure.</p>\n<div class=pair>\n";
   const auto figure = [&](const char* caption, const std::vector<unsigned char>& png) {
     text += fmt::format(
-        "<figure><img class=map alt=\"{0}\" src=\"data:image/png;base64,{1}\"><figcaption>{0}</figcaption></figure>\n",
+        "<figure><img class=map alt=\"{0}\" "
+        "src=\"data:image/png;base64,{1}\"><figcaption>{0}</figcaption></figure>\n",
         caption, base64(png));
   };
   if (!built.before.value.empty()) figure("before: as the local mapper drove it", before_picture(built));
   figure("after: the map", map_picture(built));
   text += "</div>\n";
   if (built.old_drives > 0) text += changes_section(built);
-  text += "<h2>Closures</h2>\n<p>Pictures: the earlier visit's walls black, the later one's laid on them red. To "
-          "overrule the builder: choose <i>allow</i> or <i>deny</i>, save the list, and give it to <code>build_map "
-          "--closures closures.yaml</code>.</p>\n<p><button onclick=\"saveList()\">save closures.yaml</button></p>\n"
-          "<table><tr><th></th><th class=t>found by</th><th class=t>earlier</th><th class=t>later</th><th>residual "
-          "[m]</th><th>score</th><th>overlap</th><th>agreement</th><th>wall [m]</th><th>rival</th><th>chi2</th>"
-          "<th class=t>verdict</th><th class=t>list</th><th></th></tr>\n";
+  text +=
+      "<h2>Closures</h2>\n<p>Pictures: the earlier visit's walls black, the later one's laid on them red. To "
+      "overrule the builder: choose <i>allow</i> or <i>deny</i>, save the list, and give it to "
+      "<code>build_map "
+      "--closures closures.yaml</code>.</p>\n<p><button onclick=\"saveList()\">save "
+      "closures.yaml</button></p>\n"
+      "<table><tr><th></th><th class=t>found by</th><th class=t>earlier</th><th "
+      "class=t>later</th><th>residual "
+      "[m]</th><th>score</th><th>overlap</th><th>agreement</th><th>wall [m]</th><th>rival</th><th>chi2</th>"
+      "<th class=t>verdict</th><th class=t>list</th><th></th></tr>\n";
   for (std::size_t i = 0; i < built.record.closures.size(); ++i) {
     text += row(built.record, built.record.closures[i], i + 1, i < kPictures);
   }

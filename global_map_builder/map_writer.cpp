@@ -59,7 +59,9 @@ Json changes_json(const std::vector<MapChange>& changes) {
 std::vector<std::pair<std::string, std::string>> report_figures(const Json& json) {
   std::vector<std::pair<std::string, std::string>> out;
   const auto text = [](const Json& v) {
-    return v.is_number_float() ? fmt::format("{:.3g}", v.get<double>()) : v.is_string() ? v.get<std::string>() : v.dump();
+    return v.is_number_float() ? fmt::format("{:.3g}", v.get<double>())
+           : v.is_string()     ? v.get<std::string>()
+                               : v.dump();
   };
   for (const auto& [name, value] : json.items()) {
     if (!value.is_object()) {
@@ -67,7 +69,8 @@ std::vector<std::pair<std::string, std::string>> report_figures(const Json& json
       continue;
     }
     std::string parts;
-    for (const auto& [key, part] : value.items()) parts += (parts.empty() ? "" : ", ") + key + " " + text(part);
+    for (const auto& [key, part] : value.items())
+      parts += (parts.empty() ? "" : ", ") + key + " " + text(part);
     out.emplace_back(name, parts);
   }
   return out;
@@ -84,7 +87,8 @@ std::string names_of(const MapRecord& record) {
 Json figures_of(const BuiltMap& built) {
   const MapRecord& record = built.record;
   std::size_t accepted = 0, frames = 0;
-  std::map<std::string, std::size_t> by_source = {{"button", 0}, {"automatic", 0}, {"located", 0}, {"list", 0}};
+  std::map<std::string, std::size_t> by_source = {
+      {"button", 0}, {"automatic", 0}, {"located", 0}, {"list", 0}};
   for (const Closure& c : record.closures) {
     accepted += c.accepted;
     by_source[c.source] += c.accepted;

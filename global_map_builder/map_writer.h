@@ -13,6 +13,7 @@ nlohmann::json figures_of(const BuiltMap& built);
 /// Everything of a built map into a directory, whole or not at all (see save_map): the map, graph.g2o,
 /// closures.json, closures.yaml, drives.bin, changes.json, map.png and report.html with `figures`.
 /// Sets the map's `about` and checksum.
-void write_built_map(const std::string& directory, const nlohmann::json& figures, bool force, BuiltMap* built);
+void write_built_map(const std::string& directory, const nlohmann::json& figures, bool force,
+                     BuiltMap* built);
 
 }  // namespace knav

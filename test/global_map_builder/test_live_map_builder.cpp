@@ -59,7 +59,8 @@ TEST(LiveMapBuilder, ShowsTheGrowingMapCountsMarksAndWritesTheDirectory) {
   const auto growing = node.subscribe<nav_msgs::OccupancyGrid>(
       "growing_map", 1, [&](const nav_msgs::OccupancyGrid::ConstPtr& m) { shown = m; });
   const ros::WallTime patience = ros::WallTime::now() + ros::WallDuration(10.0);
-  while ((profiles.getNumSubscribers() == 0 || odometry.getNumSubscribers() == 0 || marks.getNumSubscribers() == 0) &&
+  while ((profiles.getNumSubscribers() == 0 || odometry.getNumSubscribers() == 0 ||
+          marks.getNumSubscribers() == 0) &&
          ros::WallTime::now() < patience) {
     ros::WallDuration(0.05).sleep();
   }

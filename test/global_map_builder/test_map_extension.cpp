@@ -107,7 +107,8 @@ TEST(MapExtension, WhatWentGoesAndWhatCameIsThere) {
     int highest = -1;
     for (int dy = -2; dy <= 2; ++dy) {
       for (int dx = -2; dx <= 2; ++dx) {
-        highest = std::max<int>(highest, built.map.occupancy.value[g.index(g.cell_x(x) + dx, g.cell_y(y) + dy)]);
+        highest =
+            std::max<int>(highest, built.map.occupancy.value[g.index(g.cell_x(x) + dx, g.cell_y(y) + dy)]);
       }
     }
     return highest;
@@ -141,7 +142,8 @@ TEST(MapExtension, AnotherBuildingIsRefused) {
     builder.build();
     FAIL() << "was taken for the same building";
   } catch (const UserError& error) {
-    EXPECT_NE(std::string(error.what()).find("elsewhere.bag: shares no place"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("elsewhere.bag: shares no place"), std::string::npos)
+        << error.what();
   }
 }
 
@@ -182,7 +184,8 @@ TEST(MapRecord, ScansKeepInfinityAndFarReadings) {
   drive.keyframes.emplace_back();
   record.T_map_keyframe.emplace_back();
   RangeScan scan;
-  scan.range_m = {1.25f, 80.0f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()};
+  scan.range_m = {1.25f, 80.0f, std::numeric_limits<float>::infinity(),
+                  std::numeric_limits<float>::quiet_NaN()};
   drive.frames.push_back({1.0, 0.0, {}, {}, {}, scan});
   const std::string path = ::testing::TempDir() + "knav_scans.bin";
   write_map_record(path, record);
@@ -209,7 +212,8 @@ TEST(ClosureList, DenyingEveryClosureLeavesTheDriftAndAllowingOneTakesItOut) {
 
   const std::string written = read_text_file(path);
   std::string text = written;
-  for (std::size_t at = 0; (at = text.find("verdict: auto", at)) != std::string::npos;) text.replace(at, 13, "verdict: deny");
+  for (std::size_t at = 0; (at = text.find("verdict: auto", at)) != std::string::npos;)
+    text.replace(at, 13, "verdict: deny");
   write_text_atomically(path, text);
   std::vector<ListedClosure> list = read_closure_list(path);
   ASSERT_EQ(list.size(), plain.record.closures.size());
@@ -250,7 +254,8 @@ TEST(ClosureList, FaultsNameTheEntry) {
     build_with({unknown});
     FAIL();
   } catch (const UserError& error) {
-    EXPECT_NE(std::string(error.what()).find("my.yaml: closure 1: there is no keyframe at 1.000 s"), std::string::npos)
+    EXPECT_NE(std::string(error.what()).find("my.yaml: closure 1: there is no keyframe at 1.000 s"),
+              std::string::npos)
         << error.what();
   }
   const std::string path = ::testing::TempDir() + "knav_bad_closures.yaml";
@@ -263,10 +268,13 @@ TEST(ClosureList, FaultsNameTheEntry) {
     }
     return std::string("none");
   };
-  EXPECT_NE(fault_of("closures: [{from_stamp_s: 1, to_stamp_s: 2, verdict: perhaps}]").find("'perhaps'"), std::string::npos);
+  EXPECT_NE(fault_of("closures: [{from_stamp_s: 1, to_stamp_s: 2, verdict: perhaps}]").find("'perhaps'"),
+            std::string::npos);
   EXPECT_NE(fault_of("closures: [{from_stamp_s: 1, verdict: deny}]").find("'to_stamp_s'"), std::string::npos);
-  EXPECT_NE(fault_of("closures: [{from_stamp_s: 1, to_stamp_s: 2, verdict: allow}]").find("x_m"), std::string::npos);
-  EXPECT_NE(fault_of("closures: [{form_stamp_s: 1, to_stamp_s: 2}]").find("'form_stamp_s'"), std::string::npos);
+  EXPECT_NE(fault_of("closures: [{from_stamp_s: 1, to_stamp_s: 2, verdict: allow}]").find("x_m"),
+            std::string::npos);
+  EXPECT_NE(fault_of("closures: [{form_stamp_s: 1, to_stamp_s: 2}]").find("'form_stamp_s'"),
+            std::string::npos);
   EXPECT_NE(fault_of("[1, 2]").find("closures"), std::string::npos);
 }
 
@@ -277,7 +285,9 @@ TEST(MapReport, HoldsPicturesReasonsAndTheList) {
   const std::string text = read_text_file(path);
   EXPECT_NE(text.find("Map of &lt;two&gt; drives"), std::string::npos);
   std::size_t pictures = 0;
-  for (std::size_t at = 0; (at = text.find("data:image/png;base64,iVBORw0KGgo", at)) != std::string::npos; ++at) ++pictures;
+  for (std::size_t at = 0; (at = text.find("data:image/png;base64,iVBORw0KGgo", at)) != std::string::npos;
+       ++at)
+    ++pictures;
   EXPECT_GE(pictures, 4u) << "before, after, changes and the closures', each a PNG by its first bytes";
   std::size_t rows = 0;
   for (std::size_t at = 0; (at = text.find("<tr class=", at)) != std::string::npos; ++at) ++rows;
@@ -291,10 +301,11 @@ TEST(MapChanges, CountWhatCameAndWentButNotWhatWasNeverSeen) {
   before.value.assign(60 * 60, 0);
   OccupancyGrid now = before;
   const auto wall = [](OccupancyGrid* grid, int x, int y, int length, int value) {
-    for (int i = 0; i < length; ++i) grid->value[grid->geometry.index(x + i, y)] = static_cast<std::int8_t>(value);
+    for (int i = 0; i < length; ++i)
+      grid->value[grid->geometry.index(x + i, y)] = static_cast<std::int8_t>(value);
   };
   wall(&before, 5, 10, 40, 100);
-  wall(&now, 5, 11, 40, 100);     // the same wall, a cell off
+  wall(&now, 5, 11, 40, 100);      // the same wall, a cell off
   wall(&before, 10, 30, 10, 100);  // 0.5 m that went
   wall(&now, 30, 40, 12, 100);     // 0.6 m that came
   wall(&now, 50, 50, 2, 100);      // too short

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "core/grid_geometry.h"
+#include "global_map_builder/corrected_drive.h"
+#include "global_map_builder/map_builder_config.h"
+
+namespace knav {
+
+/// The drives' corrected poses.
+/// @param poses T_map_keyframe of all drives' keyframes, one after the other
+std::vector<CorrectedDrive> corrected_drives(const std::vector<Drive>& drives,
+                                             const std::vector<Pose2>& poses);
+
+/// The grid that holds all that was seen. UserError if it would be larger than size_max_m.
+GridGeometry surface_extent(const MapBuilderConfig& config, const std::vector<Drive>& drives,
+                            const std::vector<CorrectedDrive>& corrected);
+
+/// One surface of all drives, the newer correcting the older: signed distance [m] a cell, NaN unknown.
+/// @param report called with the fraction done; may throw to stop
+std::vector<float> build_surface(const MapBuilderConfig& config, const std::vector<Drive>& drives,
+                                 const std::vector<CorrectedDrive>& corrected, const GridGeometry& geometry,
+                                 const std::function<void(double)>& report);
+
+/// What the map would be without closures: coarse, for a picture.
+OccupancyGrid uncorrected_map(const MapBuilderConfig& config, const std::vector<Drive>& drives,
+                              const std::vector<CorrectedDrive>& corrected);
+
+}  // namespace knav
