@@ -19,7 +19,7 @@ constexpr double kDriftPath_m = 20.0;      // the heading's drift is not counted
 constexpr double kComparable = 0.15;       // overlap from which two local maps say something of each other
 constexpr double kMostAstray = 0.15;       // share of walls that may lie where the map has none
 constexpr double kMuchMoreAstray = 1.5;    // a place where so many times more lie astray is no rival
-constexpr std::size_t kMostAsked = 60;     // places of the new drive that are looked for everywhere
+constexpr std::size_t kMostAsked = 16;     // places of the new drive that are looked for everywhere
 constexpr std::size_t kMostVerified = 12;  // places where the drive may lie
 
 }  // namespace
