@@ -11,6 +11,7 @@
 #include <tf2_ros/static_transform_broadcaster.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "flat_drive.h"
@@ -106,7 +107,8 @@ TEST(LiveMapBuilder, ShowsTheGrowingMapCountsMarksAndWritesTheDirectory) {
   const MapDirectory map = load_map(folder.string());
   EXPECT_TRUE(map.warnings.empty());
   EXPECT_GT(map.trajectory.size(), route.truth.size() * 9 / 10);
-  EXPECT_NEAR(map.distance.nearest(4.5, 0.0), 1.5, 0.1) << "the corridor's half width";
+  EXPECT_NEAR(map.distance.nearest(4.5, 0.0), std::hypot(0.3, 1.0), 0.1)
+      << "the cupboard's corner at (4.2, -1)";
   EXPECT_TRUE(fs::exists(folder / "report.html"));
   EXPECT_TRUE(fs::exists(folder / "drives.bin"));
   fs::remove_all(folder);
