@@ -39,11 +39,10 @@ struct FilterConfig {
   double temperature = 0.003;
   double paper_temperature = 0.02;
   double unknown_price = 0.6;
-  int refinements = 2;
+  int refinements = 0;
   double odometry_learning_m = 0.0;
   double depth_trust_m = 0.0;
-  double fresh_after_m = 0.0;
-  double fresh_after_rad = 0.2;
+  double evidence_period_s = 0.3;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -63,11 +62,13 @@ struct FilterConfig {
         "odometry_learning_m", odometry_learning_m, 0, 1000, "m",
         "Distance over which odometry's steady errors are learned and taken out of the proposal; 0 = never.");
     v.number("depth_trust_m", depth_trust_m, 0, 100, "m",
-             "DepthProfile: at this range a reading counts half, beyond less with the range squared, as a depth camera's "
+             "DepthProfile: at this range a reading counts half, beyond less with the range squared, as a "
+             "depth camera's "
              "systematic errors grow; 0 = all count the same.");
-    v.number("fresh_after_m", fresh_after_m, 0, 10, "m",
-             "Frames share errors. A frame counts in full after this much driven, or ...; 0 = every frame in full.");
-    v.number("fresh_after_rad", fresh_after_rad, 0.001, 10, "rad", "... this much turned, else by the share of it.");
+    v.number("evidence_period_s", evidence_period_s, 0, 10, "s",
+             "Frames closer together than this share errors, and so count by the share of it that has "
+             "passed; 0 = every frame "
+             "in full.");
   }
 };
 
@@ -95,8 +96,9 @@ struct ContinuityConfig {
              "Looking through known walls for this long means that the robot was carried: a new epoch.");
     v.number("carried_see_through_fraction", carried_see_through_fraction, 0.05, 1, "",
              "Share of the readings on known rays that lie behind the map's surface, to count as that ...");
-    v.number("carried_agree_fraction", carried_agree_fraction, 0, 1, "",
-             "... unless this share of them meets the map: somebody who stood close before the camera has left.");
+    v.number(
+        "carried_agree_fraction", carried_agree_fraction, 0, 1, "",
+        "... unless this share of them meets the map: somebody who stood close before the camera has left.");
   }
 };
 

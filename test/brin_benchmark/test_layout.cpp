@@ -93,6 +93,17 @@ TEST_F(InAFolder, ALayoutIsReadByTheBenchmarkAndLeavesEveryPlaceReachable) {
   EXPECT_NE(lay_out(world, config, "tour.yaml").changes, layout.changes);
 }
 
+TEST(Protocol, TheShippedChangesFitTheBuilding) {
+  const std::string folder = std::string(KINECT_NAV_SOURCE_DIR) + "/config/worlds/";
+  const BenchmarkProtocol protocol = load_protocol(folder + "brin_changes.yaml");
+  EXPECT_EQ(protocol.runs.size(), 12u);
+  const WorldConfig world = load_world(folder + "brin_building.yaml");
+  for (const std::string& name : protocol.sequence) EXPECT_TRUE(world.places.count(name)) << name;
+  for (const BenchmarkRun& run : protocol.runs) {
+    EXPECT_GT(changed_world(folder + "brin_building.yaml", protocol, run).people.size(), 2u) << run.name;
+  }
+}
+
 std::string fault_of(const std::string& path) {
   try {
     load_protocol(path);

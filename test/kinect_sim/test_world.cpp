@@ -158,6 +158,7 @@ TEST(World, EveryShippedWorldAndTourLoads) {
   for (const auto& entry :
        std::filesystem::directory_iterator(std::string(KINECT_NAV_SOURCE_DIR) + "/config/worlds")) {
     const std::string path = entry.path().string();
+    if (path.find("_changes.yaml") != std::string::npos) continue;  // the benchmark's
     if (path.find("_tour.yaml") != std::string::npos) {
       EXPECT_NO_THROW(load_tour(path)) << path;
       ++tours;
