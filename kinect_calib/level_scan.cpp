@@ -16,10 +16,10 @@ constexpr int kStep_px = 2, kBand_px = 20;            // every second pixel of 2
 constexpr double kLowest_m = 0.1, kHighest_m = 1.8;   // above the floor
 constexpr double kFarthest_m = 6.0, kNearest_m = 0.4;
 constexpr int kLineColumns = 7;                       // each side
-constexpr double kLineCodes = 2.0;                    // a wall is no rougher
+constexpr double kLineCodes = 1.2;                    // a wall is no rougher
 constexpr int kMinColumns = 60;
 constexpr double kCorrelatedColumns = 4.0;            // noise is alike over 8 px
-constexpr double kKeyYaw_rad = 12.0 * kPi / 180.0, kKeyDistance_m = 0.25;
+constexpr double kKeyYaw_rad = 12.0 * kPi / 180.0, kKeyDistance_m = 0.8;
 
 void fit_lines(LevelScan* scan) {
   const int n = static_cast<int>(scan->slope.size());

@@ -15,7 +15,12 @@ constexpr double kGap_s = 0.3;           // odometry is not interpolated over lo
 constexpr double kLargestOffset_s = 0.5;
 constexpr double kRate_s = 0.02;         // half of what the speed of turning is taken over
 constexpr double kYawSd_rad = 0.01;      // alignments that tell less are left out
+constexpr double kLeastTurn_rad = 0.15 * kPi / 180.0;
+constexpr double kLeastWay_m = 0.02;
+constexpr double kTurnStep_s = 0.1;
 constexpr int kFewest = 40;
+// Odometry's random errors after 1 rad and 1 m, growing with the root: only the weights depend on them.
+constexpr double kTurnWalk_rad = 0.02, kDistanceWalk_m = 0.01, kHeadingWalk_rad = 0.012;
 
 double huber(double size, double scale) { return size <= 1.5 * scale ? 1.0 : 1.5 * scale / size; }
 
@@ -34,9 +39,9 @@ double jackknife_sd(const std::vector<double>& left_out) {
 
 // ------------------------------------------------------------------------------------------------ turning
 
+/// Of the camera, from one scan to another soon after.
 struct Turn {
-  const ScanMotion* motion;
-  double weight;
+  double from_s, to_s, camera_rad, weight;
 };
 
 class TurnFit {
@@ -51,9 +56,9 @@ class TurnFit {
       std::vector<std::pair<double, double>> pairs;
       for (const Turn& turn : turns_) {
         double odom = 0.0, slope = 0.0;
-        if (!odometry_turn(*turn.motion, offset, &odom, &slope)) continue;
-        pairs.emplace_back(odom, turn.motion->T_from_to.yaw_rad);
-        oo += odom * odom, oc += odom * turn.motion->T_from_to.yaw_rad;
+        if (!odometry_turn(turn, offset, &odom, &slope)) continue;
+        pairs.emplace_back(odom, turn.camera_rad);
+        oo += odom * odom, oc += odom * turn.camera_rad;
       }
       if (2 * pairs.size() < turns_.size()) continue;
       double cost = 0.0;
@@ -73,18 +78,18 @@ class TurnFit {
       for (std::size_t i = 0; i < turns_.size(); ++i) {
         if (static_cast<int>(block_of(i, turns_.size())) == without) continue;
         double odom = 0.0, slope = 0.0;
-        if (!odometry_turn(*turns_[i].motion, (*x)[0], &odom, &slope)) continue;
-        residuals.push_back(turns_[i].motion->T_from_to.yaw_rad - (*x)[1] * odom);
+        if (!odometry_turn(turns_[i], (*x)[0], &odom, &slope)) continue;
+        residuals.push_back(turns_[i].camera_rad - (*x)[1] * odom);
         jacobians.emplace_back((*x)[1] * slope, odom);
         weights.push_back(turns_[i].weight);
-        sizes.push_back(std::abs(residuals.back()));
+        sizes.push_back(std::sqrt(turns_[i].weight) * std::abs(residuals.back()));
       }
       if (residuals.size() < static_cast<std::size_t>(kFewest) / 2) return false;
       const double scale = scale_of(sizes);
       Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
       Eigen::Vector2d b = Eigen::Vector2d::Zero();
       for (std::size_t i = 0; i < residuals.size(); ++i) {
-        const double w = weights[i] * huber(std::abs(residuals[i]), scale);
+        const double w = weights[i] * huber(sizes[i], scale);
         A += w * jacobians[i] * jacobians[i].transpose();
         b += w * jacobians[i] * residuals[i];
       }
@@ -100,16 +105,16 @@ class TurnFit {
 
  private:
   /// What odometry turned, and how that changes with the offset.
-  bool odometry_turn(const ScanMotion& motion, double offset_s, double* turn_rad, double* per_s) const {
+  bool odometry_turn(const Turn& turn, double offset_s, double* turn_rad, double* per_s) const {
     Pose2 at[4];
-    const double stamps[4] = {motion.from_s + offset_s - kRate_s, motion.from_s + offset_s + kRate_s,
-                              motion.to_s + offset_s - kRate_s, motion.to_s + offset_s + kRate_s};
+    const double stamps[4] = {turn.from_s + offset_s - kRate_s, turn.from_s + offset_s + kRate_s,
+                              turn.to_s + offset_s - kRate_s, turn.to_s + offset_s + kRate_s};
     for (int k = 0; k < 4; ++k) {
       if (!interpolate_at(odometry_, stamps[k], kGap_s, &at[k])) return false;
     }
     Pose2 from, to;
-    if (!interpolate_at(odometry_, motion.from_s + offset_s, kGap_s, &from) ||
-        !interpolate_at(odometry_, motion.to_s + offset_s, kGap_s, &to))
+    if (!interpolate_at(odometry_, turn.from_s + offset_s, kGap_s, &from) ||
+        !interpolate_at(odometry_, turn.to_s + offset_s, kGap_s, &to))
       return false;
     *turn_rad = normalize_angle_rad(to.yaw_rad - from.yaw_rad);
     *per_s = (normalize_angle_rad(at[3].yaw_rad - at[2].yaw_rad) - normalize_angle_rad(at[1].yaw_rad - at[0].yaw_rad)) /
@@ -123,17 +128,24 @@ class TurnFit {
 
 void compare_turns(const std::vector<ScanMotion>& motions, const Trajectory& odometry, MotionComparison* out) {
   std::vector<Turn> turns;
-  for (const ScanMotion& motion : motions) {
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const ScanMotion& motion = motions[i];
     const double yaw_information = motion.information(2, 2);
     if (!(yaw_information > 1.0 / (kYawSd_rad * kYawSd_rad))) continue;
-    Pose2 from, to;
-    if (!interpolate_at(odometry, motion.from_s, kGap_s, &from) || !interpolate_at(odometry, motion.to_s, kGap_s, &to))
-      continue;
-    // Standing still tells nothing, but would make the typical residual look small.
-    const double turned = std::max(std::abs(motion.T_from_to.yaw_rad),
-                                   std::abs(normalize_angle_rad(to.yaw_rad - from.yaw_rad)));
-    if (turned < 0.5 * kPi / 180.0) continue;
-    turns.push_back({&motion, 1.0});
+    Turn turn = {motion.from_s, motion.to_s, motion.T_from_to.yaw_rad, 0.0};
+    // Odometry's random error grows along the turn, so short steps; the alignments' own does not, so not too short.
+    std::size_t k = i;
+    while (k > 0 && motions[k - 1].from_s == motion.from_s && motion.to_s - motions[k].to_s < kTurnStep_s) --k;
+    if (k < i) {
+      turn.from_s = motions[k].to_s;
+      turn.camera_rad = normalize_angle_rad(turn.camera_rad - motions[k].T_from_to.yaw_rad);
+    }
+    // Standing still tells nothing, but would make the typical residual look small. By the camera: were it by odometry,
+    // odometry's own errors would choose.
+    const double turned_rad = std::abs(turn.camera_rad);
+    if (turned_rad < kLeastTurn_rad) continue;
+    turn.weight = 1.0 / (2.0 / yaw_information + kTurnWalk_rad * kTurnWalk_rad * turned_rad);
+    turns.push_back(turn);
   }
   if (turns.size() < static_cast<std::size_t>(kFewest)) return;
   const TurnFit fit(std::move(turns), odometry);
@@ -199,15 +211,20 @@ void compare_drives(const std::vector<ScanMotion>& motions, const Trajectory& od
       continue;
     const Pose2 odom = from.inverse() * to;
     const Pose2& camera = motion.T_from_to;
-    if (std::hypot(odom.x_m, odom.y_m) < 0.02 && std::abs(camera.yaw_rad) < 2.0 * kPi / 180.0) continue;
+    if (std::hypot(odom.x_m, odom.y_m) < kLeastWay_m && std::abs(camera.yaw_rad) < 2.0 * kPi / 180.0) continue;
     // Of the translation alone, the rotation being unknown too.
     const Eigen::Matrix3d& full = motion.information;
     if (!(full(2, 2) > 0.0)) continue;
     const Eigen::Matrix2d information =
         full.topLeftCorner<2, 2>() - full.topRightCorner<2, 1>() * full.bottomLeftCorner<1, 2>() / full(2, 2);
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(information);
-    const Eigen::Vector2d root = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-    const Eigen::Matrix2d whiten = root.asDiagonal() * eigen.eigenvectors().transpose();
+    const double way_m = std::hypot(odom.x_m, odom.y_m);
+    const double odometry_variance =
+        kDistanceWalk_m * kDistanceWalk_m * way_m + kHeadingWalk_rad * kHeadingWalk_rad * way_m * way_m * way_m / 3.0;
+    const Eigen::Vector2d variance =
+        eigen.eigenvalues().cwiseMax(1e-3).cwiseInverse() + Eigen::Vector2d::Constant(odometry_variance);
+    const Eigen::Matrix2d whiten =
+        variance.cwiseSqrt().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
     const double c = std::cos(camera.yaw_rad), s = std::sin(camera.yaw_rad);
     MountRow row;
     row.M << odom.x_m, odom.y_m, c - 1.0, -s, odom.y_m, -odom.x_m, s, c - 1.0;

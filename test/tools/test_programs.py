@@ -15,7 +15,7 @@ from sensor_msgs.msg import LaserScan
 
 PROGRAMS = pathlib.Path(sys.argv[1])
 PROGRAM_NAMES = ("replay", "build_map", "import_carmen", "import_depth_images", "evaluate_trajectory", "calibrate_depth",
-                 "calibrate_intrinsics", "score_walls", "optimize_graph", "map_info", "localize")
+                 "calibrate_extrinsics", "calibrate_intrinsics", "score_walls", "optimize_graph", "map_info", "localize")
 # Only with the simulator (-DKINECT_NAV_SIM=ON).
 PROGRAM_NAMES += tuple(n for n in ("sensor_benchmark", "compare_sensor_model") if (PROGRAMS / n).exists())
 
