@@ -32,7 +32,8 @@ static_transform_args.)";
 
 nlohmann::json as_json(const ExtrinsicsResult& r, bool floor_only, std::string* args) {
   nlohmann::json json;
-  const auto put = [&json](const std::string& name, const std::string& unit, const Estimate& e, double scale) {
+  const auto put = [&json](const std::string& name, const std::string& unit, const Estimate& e,
+                           double scale) {
     json[name + unit] = e.value * scale;
     json[name + "_sd" + unit] = e.sd * scale;
   };
@@ -49,9 +50,9 @@ nlohmann::json as_json(const ExtrinsicsResult& r, bool floor_only, std::string* 
   put("odometry_turn_scale", "", r.motion.turn_scale, 1.0);
   put("odometry_distance_scale", "", r.motion.distance_scale, 1.0);
   json["aligned_frames"] = r.aligned_frames;
-  *args = fmt::format("{:.4f} {:.4f} {:.4f} {:.5f} {:.5f} {:.5f} base_link camera_link", r.motion.forward_m.value,
-                      r.motion.left_m.value, r.floor.height_m.value, r.motion.yaw_rad.value, r.floor.pitch_rad.value,
-                      r.floor.roll_rad.value);
+  *args = fmt::format("{:.4f} {:.4f} {:.4f} {:.5f} {:.5f} {:.5f} base_link camera_link",
+                      r.motion.forward_m.value, r.motion.left_m.value, r.floor.height_m.value,
+                      r.motion.yaw_rad.value, r.floor.pitch_rad.value, r.floor.roll_rad.value);
   json["static_transform_args"] = *args;
   return json;
 }
@@ -77,7 +78,8 @@ void print(const ExtrinsicsResult& r, bool floor_only, const std::string& args) 
   line("true turn / odometry's", r.motion.turn_scale, 1.0, "");
   line("true way / odometry's", r.motion.distance_scale, 1.0, "");
   fmt::print(
-      "\nFor robot.launch:\n  camera_x:={:.4f} camera_y:={:.4f} camera_z:={:.4f} camera_yaw:={:.5f} camera_pitch:={:.5f} "
+      "\nFor robot.launch:\n  camera_x:={:.4f} camera_y:={:.4f} camera_z:={:.4f} camera_yaw:={:.5f} "
+      "camera_pitch:={:.5f} "
       "camera_roll:={:.5f}\nFor a launch file of your own, static_transform_publisher:\n  {}\n"
       "For the configuration file:\n  rolling_shutter: {{time_offset_s: {:.4f}}}\n",
       r.motion.forward_m.value, r.motion.left_m.value, r.floor.height_m.value, r.motion.yaw_rad.value,

@@ -22,7 +22,8 @@ namespace {
 
 struct Options {
   std::string bag, json, calibration, base_frame = "base_link";
-  std::string depth_topic = "camera/depth/image_raw", info_topic = "camera/depth/camera_info", odom_topic = "odom";
+  std::string depth_topic = "camera/depth/image_raw", info_topic = "camera/depth/camera_info",
+              odom_topic = "odom";
   double seconds = 40.0;
   RobotCheckConfig check;
 };
@@ -57,8 +58,8 @@ class Feeder {
     RawCamera camera = camera_;
     if (!camera.raw.valid() || camera.raw.width_px != view_.cols || camera.raw.height_px != view_.rows) {
       camera = RawCamera{};  // judged there; here it only has to let the depths through
-      camera.raw = camera.rectified = {view_.cols, view_.rows, 1.0 * view_.cols, 1.0 * view_.cols, 0.5 * view_.cols,
-                                       0.5 * view_.rows};
+      camera.raw = camera.rectified = {view_.cols,       view_.rows,       1.0 * view_.cols,
+                                       1.0 * view_.cols, 0.5 * view_.cols, 0.5 * view_.rows};
     }
     if (corrector_.correct(view_, camera, &depth_m_)) {
       check_.add_frame(stamp_s, arrival_s, depth_m_);
@@ -102,11 +103,12 @@ class Feeder {
 
   void look_up_mount() {
     try {
-      check_.set_mount(
-          tf2::transformToEigen(tf_.lookupTransform(options_.base_frame, frame_.empty() ? "?" : plain(frame_), ros::Time(0))),
-          "");
+      check_.set_mount(tf2::transformToEigen(tf_.lookupTransform(
+                           options_.base_frame, frame_.empty() ? "?" : plain(frame_), ros::Time(0))),
+                       "");
     } catch (const tf2::TransformException& error) {
-      check_.set_mount(std::nullopt, frame_.empty() ? "no image came to name the camera's frame." : error.what());
+      check_.set_mount(std::nullopt,
+                       frame_.empty() ? "no image came to name the camera's frame." : error.what());
     }
   }
 
@@ -144,16 +146,17 @@ void listen(const Options& options, Feeder* feeder) {
   ros::NodeHandle node;
   const auto now_s = [] { return ros::Time::now().toSec(); };
   const std::vector<ros::Subscriber> subscribers = {
-      node.subscribe<sensor_msgs::Image>(options.depth_topic, 10,
-                                         [&](const sensor_msgs::ImageConstPtr& m) { feeder->image(*m, now_s()); }),
-      node.subscribe<sensor_msgs::CameraInfo>(options.info_topic, 10,
-                                              [&](const sensor_msgs::CameraInfoConstPtr& m) { feeder->info(*m); }),
-      node.subscribe<nav_msgs::Odometry>(options.odom_topic, 100,
-                                         [&](const nav_msgs::OdometryConstPtr& m) { feeder->odometry(*m, now_s()); }),
-      node.subscribe<tf2_msgs::TFMessage>("/tf", 100,
-                                          [&](const tf2_msgs::TFMessageConstPtr& m) { feeder->transforms(*m, false); }),
-      node.subscribe<tf2_msgs::TFMessage>("/tf_static", 100,
-                                          [&](const tf2_msgs::TFMessageConstPtr& m) { feeder->transforms(*m, true); })};
+      node.subscribe<sensor_msgs::Image>(
+          options.depth_topic, 10, [&](const sensor_msgs::ImageConstPtr& m) { feeder->image(*m, now_s()); }),
+      node.subscribe<sensor_msgs::CameraInfo>(
+          options.info_topic, 10, [&](const sensor_msgs::CameraInfoConstPtr& m) { feeder->info(*m); }),
+      node.subscribe<nav_msgs::Odometry>(
+          options.odom_topic, 100,
+          [&](const nav_msgs::OdometryConstPtr& m) { feeder->odometry(*m, now_s()); }),
+      node.subscribe<tf2_msgs::TFMessage>(
+          "/tf", 100, [&](const tf2_msgs::TFMessageConstPtr& m) { feeder->transforms(*m, false); }),
+      node.subscribe<tf2_msgs::TFMessage>(
+          "/tf_static", 100, [&](const tf2_msgs::TFMessageConstPtr& m) { feeder->transforms(*m, true); })};
   Progress progress(options.check.standing ? "listening" : "turn left and right, then drive on");
   const ros::WallTime start = ros::WallTime::now();
   for (double done = 0.0; done < 1.0 && ros::ok();) {
@@ -170,7 +173,8 @@ void report(const Options& options, const std::vector<CheckItem>& items) {
   nlohmann::json json = {{"passed", RobotCheck::passed(items)}, {"items", nlohmann::json::array()}};
   for (const CheckItem& item : items) {
     const char* status = kStatus[static_cast<int>(item.status)];
-    json["items"].push_back({{"name", item.name}, {"status", status}, {"found", item.found}, {"to_do", item.to_do}});
+    json["items"].push_back(
+        {{"name", item.name}, {"status", status}, {"found", item.found}, {"to_do", item.to_do}});
     if (options.json == "-") continue;
     fmt::print("{:<9} {:<20} {}\n", status, item.name, item.found);
     if (!item.to_do.empty()) fmt::print("{:31}-> {}\n", "", item.to_do);
@@ -190,7 +194,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--standing", options.check.standing, "the robot is not moved: leave out what needs motion");
   app.add_option("--calibration", options.calibration, "calibrate_depth's file for the sensor");
-  app.add_option("--time-offset", options.check.time_offset_s, "rolling_shutter/time_offset_s as configured [s]")
+  app.add_option("--time-offset", options.check.time_offset_s,
+                 "rolling_shutter/time_offset_s as configured [s]")
       ->capture_default_str();
   app.add_option("--depth-topic", options.depth_topic, "depth images")->capture_default_str();
   app.add_option("--info-topic", options.info_topic, "their camera_info")->capture_default_str();

@@ -43,10 +43,11 @@ void ExtrinsicsCalibrator::add_floor_frame(const cv::Mat& depth, const PinholeMo
 
 FloorEstimate ExtrinsicsCalibrator::floor() const {
   if (floors_.size() < kFewestFloorFrames) {
-    throw UserError(fmt::format(
-        "the floor is in view in {} of {} frames, and {} are needed: stand and drive where 1 to 4 m of bare floor lie "
-        "ahead, with the camera looking no higher than level.",
-        floors_.size(), floor_frames_, kFewestFloorFrames));
+    throw UserError(
+        fmt::format("the floor is in view in {} of {} frames, and {} are needed: stand and drive where 1 to "
+                    "4 m of bare floor lie "
+                    "ahead, with the camera looking no higher than level.",
+                    floors_.size(), floor_frames_, kFewestFloorFrames));
   }
   FloorEstimate estimate;
   estimate.frames = static_cast<int>(floor_frames_);
@@ -80,42 +81,47 @@ ExtrinsicsResult ExtrinsicsCalibrator::result() const {
   if (odometry_.size() < 2) throw UserError("there is no odometry to compare the camera's motion with.");
   if (motion.turned_rad < config_.least_turn_rad ||
       std::min(motion.turned_left_rad, right_rad) < config_.least_turn_a_side_rad) {
-    throw UserError(fmt::format(
-        "the drive turns {:.0f} degrees left and {:.0f} right; turn in place from standstill to standstill, four times "
-        "by about 90 degrees, to both sides.",
-        motion.turned_left_rad / kDegree, right_rad / kDegree));
+    throw UserError(
+        fmt::format("the drive turns {:.0f} degrees left and {:.0f} right; turn in place from standstill to "
+                    "standstill, four times "
+                    "by about 90 degrees, to both sides.",
+                    motion.turned_left_rad / kDegree, right_rad / kDegree));
   }
   if (motion.driven_m < config_.least_drive_m) {
-    throw UserError(fmt::format("the drive is {:.2f} m long; drive at least {:.1f} m straight on.", motion.driven_m,
-                                config_.least_drive_m));
+    throw UserError(fmt::format("the drive is {:.2f} m long; drive at least {:.1f} m straight on.",
+                                motion.driven_m, config_.least_drive_m));
   }
-  if (3 * result.aligned_frames < result.frames || 2 * motion.motions < result.aligned_frames || !motion.turn_known ||
-      !motion.drive_known) {
-    throw UserError(fmt::format(
-        "the camera's motion could be told in {} of {} frames, {} of them with odometry; walls, not an empty hall or a "
-        "crowd, must fill the view within 5 m, and odometry must come without gaps.",
-        result.aligned_frames, result.frames, motion.motions));
+  if (3 * result.aligned_frames < result.frames || 2 * motion.motions < result.aligned_frames ||
+      !motion.turn_known || !motion.drive_known) {
+    throw UserError(
+        fmt::format("the camera's motion could be told in {} of {} frames, {} of them with odometry; walls, "
+                    "not an empty hall or a "
+                    "crowd, must fill the view within 5 m, and odometry must come without gaps.",
+                    result.aligned_frames, result.frames, motion.motions));
   }
   if (motion.turn_scale.value < 0.0) {
     throw UserError("odometry turns right where the camera turns left: reverse the sign of its yaw first.");
   }
   if (std::abs(motion.turn_scale.value - 1.0) > config_.most_scale_error ||
       std::abs(motion.distance_scale.value - 1.0) > config_.most_scale_error) {
-    throw UserError(fmt::format(
-        "odometry is far off: the camera turned {:.2f} and drove {:.2f} times what it says; correct its scale first.",
-        motion.turn_scale.value, motion.distance_scale.value));
+    throw UserError(
+        fmt::format("odometry is far off: the camera turned {:.2f} and drove {:.2f} times what it says; "
+                    "correct its scale first.",
+                    motion.turn_scale.value, motion.distance_scale.value));
   }
   if (motion.time_offset_s.sd > config_.most_offset_sd_s) {
-    throw UserError(fmt::format(
-        "the time offset would be uncertain by {:.0f} ms, and {:.0f} is the most: turn more often from standstill to "
-        "standstill, briskly, where walls fill the view.",
-        1e3 * motion.time_offset_s.sd, 1e3 * config_.most_offset_sd_s));
+    throw UserError(
+        fmt::format("the time offset would be uncertain by {:.0f} ms, and {:.0f} is the most: turn more "
+                    "often from standstill to "
+                    "standstill, briskly, where walls fill the view.",
+                    1e3 * motion.time_offset_s.sd, 1e3 * config_.most_offset_sd_s));
   }
   if (motion.yaw_rad.sd > config_.most_yaw_sd_rad) {
-    throw UserError(fmt::format(
-        "the camera's yaw would be uncertain by {:.2f} degrees, and {:.2f} is the most: drive farther straight on, "
-        "towards walls that are not all parallel to the way.",
-        motion.yaw_rad.sd / kDegree, config_.most_yaw_sd_rad / kDegree));
+    throw UserError(
+        fmt::format("the camera's yaw would be uncertain by {:.2f} degrees, and {:.2f} is the most: drive "
+                    "farther straight on, "
+                    "towards walls that are not all parallel to the way.",
+                    motion.yaw_rad.sd / kDegree, config_.most_yaw_sd_rad / kDegree));
   }
   return result;
 }

@@ -37,10 +37,10 @@ struct ExtrinsicsResult {
   int frames = 0, aligned_frames = 0;
 };
 
-/// Where the camera sits on the robot, and odometry's time against its own. Height, pitch and roll from the floor over
-/// many frames (medians; standard errors between seconds of the drive), the rest by compare_motions(). Two passes, as
-/// the second needs the level that the first finds. Standard errors know nothing of what the sensor itself gets
-/// wrong: calibrate its depth first.
+/// Where the camera sits on the robot, and odometry's time against its own. Height, pitch and roll from the
+/// floor over many frames (medians; standard errors between seconds of the drive), the rest by
+/// compare_motions(). Two passes, as the second needs the level that the first finds. Standard errors know
+/// nothing of what the sensor itself gets wrong: calibrate its depth first.
 class ExtrinsicsCalibrator {
  public:
   explicit ExtrinsicsCalibrator(const ExtrinsicsConfig& config) : config_(config), finder_(config.floor) {}
@@ -51,7 +51,8 @@ class ExtrinsicsCalibrator {
   FloorEstimate floor() const;
 
   /// Second pass, in the order of stamps; `mount` is floor().mount().
-  void add_motion_frame(const cv::Mat& depth, const PinholeModel& camera, const FloorMount& mount, double stamp_s);
+  void add_motion_frame(const cv::Mat& depth, const PinholeModel& camera, const FloorMount& mount,
+                        double stamp_s);
   /// In either pass, in the order of stamps; others are ignored.
   void add_odometry(double stamp_s, const Pose2& T_odom_base);
   /// UserError that says what the drive lacks.

@@ -9,8 +9,8 @@
 
 namespace knav {
 
-/// How the camera stands above the floor, by which T_base_camera = Rz(yaw) Ry(pitch) Rx(roll) and its z are known but
-/// for the yaw (camera: x forward, y left, z up).
+/// How the camera stands above the floor, by which T_base_camera = Rz(yaw) Ry(pitch) Rx(roll) and its z are
+/// known but for the yaw (camera: x forward, y left, z up).
 struct FloorMount {
   double height_m = 0.0;
   double pitch_rad = 0.0;  ///< positive looks down
@@ -31,9 +31,9 @@ struct FloorFinderConfig {
   std::uint64_t seed = 1;
 };
 
-/// The floor in one depth frame when nothing is known of the mount: the plane, within tilt_max_deg of level, that most
-/// readings lie on and hardly any below (a table top has floor below it). In inverse depth, where a plane is linear in
-/// the pixel and noise uniform.
+/// The floor in one depth frame when nothing is known of the mount: the plane, within tilt_max_deg of level,
+/// that most readings lie on and hardly any below (a table top has floor below it). In inverse depth, where a
+/// plane is linear in the pixel and noise uniform.
 class FloorFinder {
  public:
   explicit FloorFinder(const FloorFinderConfig& config) : config_(config) {}

@@ -12,13 +12,13 @@ namespace knav {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr int kStep_px = 2, kBand_px = 20;            // every second pixel of 20 rows up and down
-constexpr double kLowest_m = 0.1, kHighest_m = 1.8;   // above the floor
+constexpr int kStep_px = 2, kBand_px = 20;           // every second pixel of 20 rows up and down
+constexpr double kLowest_m = 0.1, kHighest_m = 1.8;  // above the floor
 constexpr double kFarthest_m = 6.0, kNearest_m = 0.4;
-constexpr int kLineColumns = 7;                       // each side
-constexpr double kLineCodes = 1.2;                    // a wall is no rougher
+constexpr int kLineColumns = 7;     // each side
+constexpr double kLineCodes = 1.2;  // a wall is no rougher
 constexpr int kMinColumns = 60;
-constexpr double kCorrelatedColumns = 4.0;            // noise is alike over 8 px
+constexpr double kCorrelatedColumns = 4.0;  // noise is alike over 8 px
 constexpr double kKeyYaw_rad = 12.0 * kPi / 180.0, kKeyDistance_m = 0.8;
 
 void fit_lines(LevelScan* scan) {
@@ -30,7 +30,8 @@ void fit_lines(LevelScan* scan) {
     constexpr double count = 2 * kLineColumns + 1;
     const double s0 = scan->slope[static_cast<std::size_t>(i)];
     for (int j = i - kLineColumns; j <= i + kLineColumns; ++j) {
-      const double ds = scan->slope[static_cast<std::size_t>(j)] - s0, value = scan->per_m[static_cast<std::size_t>(j)];
+      const double ds = scan->slope[static_cast<std::size_t>(j)] - s0,
+                   value = scan->per_m[static_cast<std::size_t>(j)];
       s += ds, q += value, ss += ds * ds, sq += ds * value;
     }
     const double determinant = count * ss - s * s;
@@ -54,8 +55,8 @@ void make_level_scan(const cv::Mat& depth, const PinholeModel& camera, const Flo
   const Eigen::Matrix3d R = mount.R_level_camera();
   const double horizon = camera.cy_px - camera.fy_px * std::tan(mount.pitch_rad);
   const int middle = static_cast<int>(std::clamp(horizon, 1.0 * kBand_px, depth.rows - 1.0 - kBand_px));
-  scan->stamp_s =
-      stamp_s + (static_cast<double>(middle) / (depth.rows - 1) - timing.stamp_row_fraction) * timing.readout_s;
+  scan->stamp_s = stamp_s + (static_cast<double>(middle) / (depth.rows - 1) - timing.stamp_row_fraction) *
+                                timing.readout_s;
   scan->slope.clear();
   scan->per_m.clear();
   std::vector<double> per_m, slope, sorted;
@@ -66,8 +67,8 @@ void make_level_scan(const cv::Mat& depth, const PinholeModel& camera, const Flo
       if (v < 0 || v >= depth.rows) continue;
       const double z = depth.at<float>(v, u);
       if (!(z > kNearest_m && z < kFarthest_m)) continue;
-      const Eigen::Vector3d level =
-          R * Eigen::Vector3d(z, -(u - camera.cx_px) / camera.fx_px * z, -(v - camera.cy_px) / camera.fy_px * z);
+      const Eigen::Vector3d level = R * Eigen::Vector3d(z, -(u - camera.cx_px) / camera.fx_px * z,
+                                                        -(v - camera.cy_px) / camera.fy_px * z);
       const double height_m = mount.height_m + level.z();
       if (height_m < kLowest_m || height_m > kHighest_m || level.x() < kNearest_m) continue;
       per_m.push_back(1.0 / level.x());

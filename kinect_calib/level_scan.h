@@ -16,8 +16,8 @@ struct ReadoutTiming {
   double stamp_row_fraction = 0.5;
 };
 
-/// What a narrow band of rows about the horizon sees, level: read within 3 ms, so that a turning robot does not shear
-/// it. A point is (forward, left) = (1, slope) / per_m.
+/// What a narrow band of rows about the horizon sees, level: read within 3 ms, so that a turning robot does
+/// not shear it. A point is (forward, left) = (1, slope) / per_m.
 struct LevelScan {
   double stamp_s = 0.0;  ///< when the band's middle row was read
   std::vector<double> slope, per_m;
@@ -33,16 +33,17 @@ void make_level_scan(const cv::Mat& depth, const PinholeModel& camera, const Flo
 struct ScanMotion {
   double from_s = 0.0, to_s = 0.0;
   Pose2 T_from_to;
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< of (x m, y m, yaw rad): small where nothing tells
-  int columns = 0;                                        ///< that agreed
+  Eigen::Matrix3d information =
+      Eigen::Matrix3d::Zero();  ///< of (x m, y m, yaw rad): small where nothing tells
+  int columns = 0;              ///< that agreed
 };
 
-/// Aligns `to` with the walls of `from`, starting at motion->T_from_to. Residuals are in disparity, where the noise is
-/// uniform. @return false if too little agrees
+/// Aligns `to` with the walls of `from`, starting at motion->T_from_to. Residuals are in disparity, where the
+/// noise is uniform. @return false if too little agrees
 bool align_scans(const LevelScan& from, const LevelScan& to, ScanMotion* motion);
 
-/// Camera motion from a sequence of scans: each is aligned with a scan up to 12 degrees or 0.25 m back, without
-/// odometry, so that it can be compared with it.
+/// Camera motion from a sequence of scans: each is aligned with a scan up to 12 degrees or 0.25 m back,
+/// without odometry, so that it can be compared with it.
 class ScanOdometry {
  public:
   /// Scans in the order of their stamps. @return false for the first scan and where alignment failed

@@ -11,10 +11,10 @@ namespace knav {
 namespace {
 
 constexpr int kBlocks = 10;
-constexpr double kGap_s = 0.3;           // odometry is not interpolated over longer ones
+constexpr double kGap_s = 0.3;  // odometry is not interpolated over longer ones
 constexpr double kLargestOffset_s = 0.5;
-constexpr double kRate_s = 0.02;         // half of what the speed of turning is taken over
-constexpr double kYawSd_rad = 0.01;      // alignments that tell less are left out
+constexpr double kRate_s = 0.02;     // half of what the speed of turning is taken over
+constexpr double kYawSd_rad = 0.01;  // alignments that tell less are left out
 constexpr double kLeastTurn_rad = 0.15 * kPi / 180.0;
 constexpr double kLeastWay_m = 0.02;
 constexpr double kTurnStep_s = 0.1;
@@ -46,7 +46,8 @@ struct Turn {
 
 class TurnFit {
  public:
-  TurnFit(std::vector<Turn> turns, const Trajectory& odometry) : turns_(std::move(turns)), odometry_(odometry) {}
+  TurnFit(std::vector<Turn> turns, const Trajectory& odometry)
+      : turns_(std::move(turns)), odometry_(odometry) {}
 
   /// Over all offsets, to start from.
   double coarse_offset_s() const {
@@ -117,7 +118,8 @@ class TurnFit {
         !interpolate_at(odometry_, turn.to_s + offset_s, kGap_s, &to))
       return false;
     *turn_rad = normalize_angle_rad(to.yaw_rad - from.yaw_rad);
-    *per_s = (normalize_angle_rad(at[3].yaw_rad - at[2].yaw_rad) - normalize_angle_rad(at[1].yaw_rad - at[0].yaw_rad)) /
+    *per_s = (normalize_angle_rad(at[3].yaw_rad - at[2].yaw_rad) -
+              normalize_angle_rad(at[1].yaw_rad - at[0].yaw_rad)) /
              (2.0 * kRate_s);
     return true;
   }
@@ -126,22 +128,25 @@ class TurnFit {
   const Trajectory& odometry_;
 };
 
-void compare_turns(const std::vector<ScanMotion>& motions, const Trajectory& odometry, MotionComparison* out) {
+void compare_turns(const std::vector<ScanMotion>& motions, const Trajectory& odometry,
+                   MotionComparison* out) {
   std::vector<Turn> turns;
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const ScanMotion& motion = motions[i];
     const double yaw_information = motion.information(2, 2);
     if (!(yaw_information > 1.0 / (kYawSd_rad * kYawSd_rad))) continue;
     Turn turn = {motion.from_s, motion.to_s, motion.T_from_to.yaw_rad, 0.0};
-    // Odometry's random error grows along the turn, so short steps; the alignments' own does not, so not too short.
+    // Odometry's random error grows along the turn, so short steps; the alignments' own does not, so not too
+    // short.
     std::size_t k = i;
-    while (k > 0 && motions[k - 1].from_s == motion.from_s && motion.to_s - motions[k].to_s < kTurnStep_s) --k;
+    while (k > 0 && motions[k - 1].from_s == motion.from_s && motion.to_s - motions[k].to_s < kTurnStep_s)
+      --k;
     if (k < i) {
       turn.from_s = motions[k].to_s;
       turn.camera_rad = normalize_angle_rad(turn.camera_rad - motions[k].T_from_to.yaw_rad);
     }
-    // Standing still tells nothing, but would make the typical residual look small. By the camera: were it by odometry,
-    // odometry's own errors would choose.
+    // Standing still tells nothing, but would make the typical residual look small. By the camera: were it by
+    // odometry, odometry's own errors would choose.
     const double turned_rad = std::abs(turn.camera_rad);
     if (turned_rad < kLeastTurn_rad) continue;
     turn.weight = 1.0 / (2.0 / yaw_information + kTurnWalk_rad * kTurnWalk_rad * turned_rad);
@@ -201,7 +206,8 @@ Mount mount_of(const Eigen::Vector4d& m) {
   return {yaw, std::hypot(m[0], m[1]), c * m[2] - s * m[3], s * m[2] + c * m[3]};
 }
 
-void compare_drives(const std::vector<ScanMotion>& motions, const Trajectory& odometry, MotionComparison* out) {
+void compare_drives(const std::vector<ScanMotion>& motions, const Trajectory& odometry,
+                    MotionComparison* out) {
   std::vector<MountRow> rows;
   for (const ScanMotion& motion : motions) {
     Pose2 from, to;
@@ -211,7 +217,8 @@ void compare_drives(const std::vector<ScanMotion>& motions, const Trajectory& od
       continue;
     const Pose2 odom = from.inverse() * to;
     const Pose2& camera = motion.T_from_to;
-    if (std::hypot(odom.x_m, odom.y_m) < kLeastWay_m && std::abs(camera.yaw_rad) < 2.0 * kPi / 180.0) continue;
+    if (std::hypot(odom.x_m, odom.y_m) < kLeastWay_m && std::abs(camera.yaw_rad) < 2.0 * kPi / 180.0)
+      continue;
     // Of the translation alone, the rotation being unknown too.
     const Eigen::Matrix3d& full = motion.information;
     if (!(full(2, 2) > 0.0)) continue;
@@ -219,8 +226,8 @@ void compare_drives(const std::vector<ScanMotion>& motions, const Trajectory& od
         full.topLeftCorner<2, 2>() - full.topRightCorner<2, 1>() * full.bottomLeftCorner<1, 2>() / full(2, 2);
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(information);
     const double way_m = std::hypot(odom.x_m, odom.y_m);
-    const double odometry_variance =
-        kDistanceWalk_m * kDistanceWalk_m * way_m + kHeadingWalk_rad * kHeadingWalk_rad * way_m * way_m * way_m / 3.0;
+    const double odometry_variance = kDistanceWalk_m * kDistanceWalk_m * way_m +
+                                     kHeadingWalk_rad * kHeadingWalk_rad * way_m * way_m * way_m / 3.0;
     const Eigen::Vector2d variance =
         eigen.eigenvalues().cwiseMax(1e-3).cwiseInverse() + Eigen::Vector2d::Constant(odometry_variance);
     const Eigen::Matrix2d whiten =
@@ -265,7 +272,8 @@ MotionComparison compare_motions(const std::vector<ScanMotion>& motions, const T
   }
   for (const ScanMotion& motion : motions) {
     Pose2 pose;
-    if (interpolate_at(odometry, motion.from_s, kGap_s, &pose) && interpolate_at(odometry, motion.to_s, kGap_s, &pose))
+    if (interpolate_at(odometry, motion.from_s, kGap_s, &pose) &&
+        interpolate_at(odometry, motion.to_s, kGap_s, &pose))
       ++out.motions;
   }
   compare_turns(motions, odometry, &out);

@@ -47,13 +47,15 @@ void RobotBag::read(const std::string& stage, const Visitor& visitor) {
                     if (visitor.frame) visitor.frame(depth_m, camera.rectified, image->header.stamp.toSec());
                     progress.update(done, fmt::format("{} frames", ++frames));
                   } else {
-                    throw UserError(fmt::format("{}: topic '{}' has type {}, which is none of Image, CameraInfo and "
-                                                "Odometry.",
-                                                bag_.path(), message.getTopic(), message.getDataType()));
+                    throw UserError(
+                        fmt::format("{}: topic '{}' has type {}, which is none of Image, CameraInfo and "
+                                    "Odometry.",
+                                    bag_.path(), message.getTopic(), message.getDataType()));
                   }
                 });
   if (frames == 0) {
-    throw UserError(fmt::format("{}: no depth image follows a usable '{}'.", bag_.path(), topics_.camera_info));
+    throw UserError(
+        fmt::format("{}: no depth image follows a usable '{}'.", bag_.path(), topics_.camera_info));
   }
 }
 

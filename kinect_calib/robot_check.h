@@ -15,13 +15,14 @@
 namespace knav {
 
 struct RobotCheckConfig {
-  bool standing = false;        ///< the robot is not to be moved: what needs motion is left out
-  double time_offset_s = 0.0;   ///< rolling_shutter/time_offset_s as configured
+  bool standing = false;       ///< the robot is not to be moved: what needs motion is left out
+  double time_offset_s = 0.0;  ///< rolling_shutter/time_offset_s as configured
   double least_depth_hz = 15.0, least_odometry_hz = 15.0;
   double most_odometry_gap_s = 0.25;  ///< rolling_shutter/odometry_gap_s
   double most_age_s = 0.5;            ///< from a stamp to its arrival
   double least_valid_share = 0.3;
-  double most_height_error_m = 0.04, most_tilt_error_rad = 0.04;  ///< floor_removal takes 0.05 m and 3 degrees
+  double most_height_error_m = 0.04,
+         most_tilt_error_rad = 0.04;  ///< floor_removal takes 0.05 m and 3 degrees
   double most_yaw_error_rad = 0.09;
   double most_scale_error = 0.15;
   double most_offset_error_s = 0.02;
@@ -37,9 +38,9 @@ struct CheckItem {
   std::string to_do;  ///< one sentence; empty if ok
 };
 
-/// Sensor, TF and odometry before the first drive. Collects what arrives, live or from a recording, and judges it at the
-/// end. Motion is that of the depth images, compared with odometry's (compare_motions()), so that a wrong sign shows:
-/// driving forward must bring the scene nearer, turning left must raise the yaw.
+/// Sensor, TF and odometry before the first drive. Collects what arrives, live or from a recording, and
+/// judges it at the end. Motion is that of the depth images, compared with odometry's (compare_motions()), so
+/// that a wrong sign shows: driving forward must bring the scene nearer, turning left must raise the yaw.
 class RobotCheck {
  public:
   explicit RobotCheck(const RobotCheckConfig& config) : config_(config), finder_(FloorFinderConfig{}) {}

@@ -9,7 +9,8 @@
 
 namespace knav {
 
-/// config/worlds/setup_tour.yaml driven once, every second depth frame and odometry at 50 Hz handed to whoever tests.
+/// config/worlds/setup_tour.yaml driven once, every second depth frame and odometry at 50 Hz handed to
+/// whoever tests.
 struct SimulatedDrive {
   SimulatorConfig config;
   double end_s = 1e9;  ///< of the simulation, from its start

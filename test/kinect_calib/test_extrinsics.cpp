@@ -31,7 +31,8 @@ void drive(const SimulatorConfig& config, double end_s, std::vector<Variant>* va
       if (frames <= kFloorFrames || frames % 5 == 0)
         variant.calibrator.add_floor_frame(depth, simulator.camera(), stamp_s);
       if (frames <= kFloorFrames) continue;
-      variant.calibrator.add_motion_frame(depth, simulator.camera(), variant.calibrator.floor().mount(), stamp_s);
+      variant.calibrator.add_motion_frame(depth, simulator.camera(), variant.calibrator.floor().mount(),
+                                          stamp_s);
     }
   };
   simulated.odometry = [&](double stamp_s, const Pose2& pose) {
@@ -113,7 +114,8 @@ TEST(FloorFinder, TakesTheFloorNotTheTableNorTheWall) {
 
 TEST(FloorFinder, NoFloorIsRefusedWithWhereToStand) {
   ExtrinsicsCalibrator calibrator{ExtrinsicsConfig{}};
-  for (int i = 0; i < 20; ++i) calibrator.add_floor_frame(cv::Mat(480, 640, CV_32FC1, 1.5f), kCamera, 0.1 * i);
+  for (int i = 0; i < 20; ++i)
+    calibrator.add_floor_frame(cv::Mat(480, 640, CV_32FC1, 1.5f), kCamera, 0.1 * i);
   EXPECT_THAT(refusal(calibrator), testing::HasSubstr("bare floor"));
 }
 
@@ -123,7 +125,8 @@ LevelScan wall_scan(const Pose2& T_wall_camera) {
   for (double slope = -0.5; slope <= 0.5; slope += 0.0035) {
     // The ray's point t (1, slope) in the camera lies on the wall.
     const double c = std::cos(T_wall_camera.yaw_rad), s = std::sin(T_wall_camera.yaw_rad);
-    const double a = (c - s * slope) + 0.5 * (s + c * slope), b = 3.0 - T_wall_camera.x_m - 0.5 * T_wall_camera.y_m;
+    const double a = (c - s * slope) + 0.5 * (s + c * slope),
+                 b = 3.0 - T_wall_camera.x_m - 0.5 * T_wall_camera.y_m;
     scan.slope.push_back(slope);
     scan.per_m.push_back(a / b);
     scan.line_at.push_back((c + 0.5 * s) / b);

@@ -36,9 +36,13 @@ CheckItem item(const RobotCheck& check, const std::string& name) {
 TEST(RobotCheck, EachFaultOfADriveShowsInItsOwnLine) {
   enum { kRight, kYawReversed, kBackwards, kLate, kTooHigh, kSlow, kCount };
   std::vector<Variant> variants(kCount);
-  variants[kYawReversed].odometry = [](double*, Pose2* pose) { pose->yaw_rad = -pose->yaw_rad, pose->y_m = -pose->y_m; };
+  variants[kYawReversed].odometry = [](double*, Pose2* pose) {
+    pose->yaw_rad = -pose->yaw_rad, pose->y_m = -pose->y_m;
+  };
   // The wheels' sign is wrong for driving: the pose runs backwards along the true heading.
-  variants[kBackwards].odometry = [](double*, Pose2* pose) { pose->x_m = -pose->x_m, pose->y_m = -pose->y_m; };
+  variants[kBackwards].odometry = [](double*, Pose2* pose) {
+    pose->x_m = -pose->x_m, pose->y_m = -pose->y_m;
+  };
   variants[kLate].odometry = [](double* stamp_s, Pose2*) { *stamp_s += 0.08; };
   variants[kTooHigh].mount = [](Eigen::Isometry3d* T) { T->translation().z() += 0.1; };
   variants[kSlow].odometry_step = 10;
@@ -68,8 +72,10 @@ TEST(RobotCheck, EachFaultOfADriveShowsInItsOwnLine) {
   };
   drive.run();
   using testing::Contains;
-  EXPECT_THAT(problems(variants[kRight].check), testing::IsEmpty()) << item(variants[kRight].check, "depth/rate").found;
-  EXPECT_THAT(item(variants[kYawReversed].check, "odometry/turn").to_do, testing::HasSubstr("reverse its sign"));
+  EXPECT_THAT(problems(variants[kRight].check), testing::IsEmpty())
+      << item(variants[kRight].check, "depth/rate").found;
+  EXPECT_THAT(item(variants[kYawReversed].check, "odometry/turn").to_do,
+              testing::HasSubstr("reverse its sign"));
   EXPECT_THAT(problems(variants[kBackwards].check), testing::ElementsAre("odometry/drive"));
   EXPECT_THAT(item(variants[kBackwards].check, "odometry/drive").to_do, testing::HasSubstr("nearer"));
   EXPECT_THAT(problems(variants[kLate].check), Contains("time_offset"));
@@ -80,7 +86,7 @@ TEST(RobotCheck, EachFaultOfADriveShowsInItsOwnLine) {
 TEST(RobotCheck, NothingArrivingIsSaidLineByLine) {
   const RobotCheck check{RobotCheckConfig{}};
   EXPECT_THAT(problems(check), testing::IsSupersetOf({"depth/rate", "camera_info", "tf/camera", "tf/odometry",
-                                                       "odometry/rate", "mount/floor", "odometry/turn"}));
+                                                      "odometry/rate", "mount/floor", "odometry/turn"}));
   EXPECT_FALSE(RobotCheck::passed(check.checklist()));
 }
 

@@ -15,7 +15,8 @@ from sensor_msgs.msg import LaserScan
 
 PROGRAMS = pathlib.Path(sys.argv[1])
 PROGRAM_NAMES = ("replay", "build_map", "import_carmen", "import_depth_images", "evaluate_trajectory", "calibrate_depth",
-                 "calibrate_extrinsics", "calibrate_intrinsics", "score_walls", "optimize_graph", "map_info", "localize")
+                 "calibrate_extrinsics", "calibrate_intrinsics", "check_robot", "score_walls", "optimize_graph",
+                 "map_info", "localize")
 # Only with the simulator (-DKINECT_NAV_SIM=ON).
 PROGRAM_NAMES += tuple(n for n in ("sensor_benchmark", "compare_sensor_model") if (PROGRAMS / n).exists())
 
@@ -101,6 +102,10 @@ class Programs(unittest.TestCase):
         write_bag(bag, odometry=False)
         self.assert_refused(run("replay", bag, "--trajectory", self.dir / "out.tum"), bag, "odom")
         self.assert_refused(run("build_map", bag, "--out", self.dir / "map"), bag, "odom")
+        for program in ("calibrate_extrinsics", "check_robot"):  # neither depth nor odometry
+            code, text = run(program, bag)
+            self.assertEqual(code, 1, text)
+        self.assert_refused(run("calibrate_extrinsics", bag), bag, "camera/depth/image_raw")
         write_bag(bag, scans=False)
         self.assert_refused(run("replay", bag, "--trajectory", self.dir / "out.tum"), bag, "depth_profile")
         self.assert_only("drive.bag")
