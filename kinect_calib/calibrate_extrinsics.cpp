@@ -87,6 +87,12 @@ void print(const ExtrinsicsResult& r, bool floor_only, const std::string& args) 
 }
 
 void calibrate(const Options& options) {
+  if (options.calibration.empty()) {
+    fmt::print(
+        stderr,
+        "calibrate_extrinsics: without --calibration depths are taken as they are; those of an uncalibrated "
+        "Kinect may turn the yaw by 2 degrees.\n");
+  }
   ExtrinsicsCalibrator calibrator(options.config);
   RobotBag bag(options.bag, options.topics, options.calibration);
   int frame = 0;

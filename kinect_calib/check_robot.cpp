@@ -87,7 +87,7 @@ class Feeder {
                           newest_image_.isZero() ? ros::Time(0) : newest_image_ - ros::Duration(0.3));
       found = true;
     } catch (const tf2::TransformException& error) {
-      why = error.what();
+      why = fmt::format("TF does not join {} and {}: {}", odom_frame_, options_.base_frame, error.what());
     }
     check_.set_odometry_tf(found, why);
     return check_.checklist();
@@ -107,8 +107,10 @@ class Feeder {
                            options_.base_frame, frame_.empty() ? "?" : plain(frame_), ros::Time(0))),
                        "");
     } catch (const tf2::TransformException& error) {
-      check_.set_mount(std::nullopt,
-                       frame_.empty() ? "no image came to name the camera's frame." : error.what());
+      check_.set_mount(std::nullopt, frame_.empty()
+                                         ? "No image came to name the camera's frame."
+                                         : fmt::format("TF does not join {} and {}: {}", options_.base_frame,
+                                                       plain(frame_), error.what()));
     }
   }
 
