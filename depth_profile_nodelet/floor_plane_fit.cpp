@@ -13,6 +13,7 @@ namespace knav {
 namespace {
 
 constexpr int kBlockRows = 16;
+constexpr double kUpright = 0.5;  ///< a surface that rises less than this part of the floor's slope stands
 
 struct RowTerms {
   float row_up, per_fx, cx, up_x, height, inverse_height, y;
@@ -47,6 +48,7 @@ struct LineTerms {
   float variance_max;     ///< of the readings about their own line
   float slope_max;        ///< of the line against the reference plane's; infinite: any
   float slope_sd_factor;  ///< a slope from few rows is itself uncertain
+  float upright_slope;  ///< of the line against the reference plane's, below which it is an upright surface's
 };
 
 /// Do the readings lie on a line, and does it rise as the floor's? Without branches, so that it vectorises.
@@ -61,12 +63,21 @@ inline bool like_floor(float n, float y, float yy, float r, float yr, float rr, 
   return (var_y >= 1e-9f) & (var_r <= terms.variance_max) & (steep <= steep_max);
 }
 
+/// Do the readings rise so little that they show an upright surface? It says nothing about where the floor
+/// is.
+inline bool like_upright(float n, float y, float yy, float r, float yr, const LineTerms& terms) {
+  const float per_n = 1.0f / n, mean_y = y * per_n, mean_r = r * per_n;
+  const float var_y = yy * per_n - mean_y * mean_y;
+  return yr * per_n - mean_y * mean_r < terms.upright_slope * var_y;
+}
+
 /// A column's sums, by name.
 struct SumPointers {
   float *n, *y, *yy, *r, *yr, *rr;
 };
 
-/// Adds a block of rows to the columns in which it looks like floor, and clears it.
+/// Adds a block of rows to the columns in which it looks like floor, and clears it. Candidates are the rows
+/// that do, or that look like something else that lies.
 KNAV_MULTIVERSION
 void add_columns(const SumPointers& block, const SumPointers& sums, float* candidates, int width,
                  const LineTerms& line) {
@@ -76,7 +87,7 @@ void add_columns(const SumPointers& block, const SumPointers& sums, float* candi
   for (int u = 0; u < width; ++u) {
     const float n = b.n[u], y = b.y[u], yy = b.yy[u], r = b.r[u], yr = b.yr[u], rr = b.rr[u];
     const bool joins = (n >= 4.0f) & like_floor(n, y, yy, r, yr, rr, terms);
-    candidates[u] += n;
+    candidates[u] += (joins | !like_upright(n, y, yy, r, yr, terms)) ? n : 0.0f;
     s.n[u] += joins ? n : 0.0f;
     s.y[u] += joins ? y : 0.0f;
     s.yy[u] += joins ? yy : 0.0f;
@@ -92,12 +103,15 @@ Eigen::Vector3d gradient_of(const FloorPlane& plane) { return -plane.up / plane.
 
 LineTerms line_terms(const FloorFitConfig& config, const FloorPlane& reference) {
   const auto noise = static_cast<float>(config.noise_codes * kInverseDepthPerCode);
-  if (config.method == "paper") return {noise * noise, std::numeric_limits<float>::infinity(), 0.0f};
+  if (config.method == "paper") {
+    const float any = std::numeric_limits<float>::infinity();
+    return {noise * noise, any, 0.0f, -any};
+  }
   // The inverse depth of a floor rises by 1 / height per unit of y; a wall's does not rise at all.
   const double steepness = std::abs(gradient_of(reference).y());
   return {noise * noise,
           static_cast<float>(steepness * (config.height_tolerance_m / reference.height_m + 0.15)),
-          static_cast<float>(2.0 * kInverseDepthPerCode)};
+          static_cast<float>(2.0 * kInverseDepthPerCode), static_cast<float>(-kUpright * steepness)};
 }
 
 FloorPlane plane_of(const Eigen::Vector3d& gradient) {

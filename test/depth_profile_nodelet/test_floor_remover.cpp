@@ -202,6 +202,22 @@ TEST(FloorRemover, AWideLowBoxDoesNotKeepTheFloorFromBeingFound) {
   EXPECT_NEAR(seen.profile.z_m[320], 1.5, 0.06);
 }
 
+TEST(FloorRemover, AWallsFootDoesNotKeepTheFloorBesideItFromBeingFound) {
+  // Up to column 452 a wall 1.1 m ahead, its foot within the gate of the mount's floor; right of it, in 29 %
+  // of the columns, floor. The robot has pitched and rolled, and has found no floor before.
+  Scene scene;
+  scene.floor();
+  scene.wall(1.1, -0.25, 10.0);
+  scene.wall(4.0);
+  const Eigen::Isometry3d truth = mount(0.5, 1.5, -1.0);
+  FloorRemover remover{FloorRemovalConfig{}};
+  const Seen seen = look(&remover, test::render(scene, kinect_camera(), truth), mount());
+  EXPECT_EQ(seen.floor.source, FloorSource::kFrame);
+  const FloorPlane expected = FloorPlane::from_mount(truth);
+  EXPECT_LT(std::acos(std::min(1.0, seen.floor.plane.up.dot(expected.up))) * 180 / M_PI, 0.3);
+  EXPECT_NEAR(count_between(seen.profile.z_m, 1.05, 1.15), 453, 2);  // 319.5 + 585 x 0.25 / 1.1 = 452.5
+}
+
 TEST(FloorRemover, FloorSeenBeyondAHoleAtTheRobotsFeetIsNotFree) {
   // Floor to 1.0 m, below the view's edge; then nothing; floor again from 6 m and a wall at 8 m.
   Scene scene;
