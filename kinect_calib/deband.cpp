@@ -100,8 +100,8 @@ int Debander::remove_bands(cv::Mat* depth_m) {
   measure_steps(*depth_m);
   const double smallest = std::max(kSmallest, kSignificant * error_per_m_);
   band_per_m_.assign(size, 0.0);
+  steps_.clear();
   double level = 0.0;
-  int steps = 0;
   for (int u = 0; u < width; ++u) {
     const double step = step_per_m_[static_cast<std::size_t>(u)];
     bool largest = std::abs(step) > smallest;
@@ -112,11 +112,11 @@ int Debander::remove_bands(cv::Mat* depth_m) {
     }
     if (largest) {
       level += step;
-      ++steps;
+      steps_.push_back({u, step});
     }
     band_per_m_[static_cast<std::size_t>(u)] = level;
   }
-  if (steps == 0) return 0;
+  if (steps_.empty()) return 0;
   keep_smooth_part();
   for (int v = 0; v < depth_m->rows; ++v) {
     float* row = depth_m->ptr<float>(v);
@@ -124,7 +124,7 @@ int Debander::remove_bands(cv::Mat* depth_m) {
       row[u] = static_cast<float>(1.0 / (1.0 / row[u] - band_per_m_[static_cast<std::size_t>(u)]));
     }
   }
-  return steps;
+  return static_cast<int>(steps_.size());
 }
 
 /// A step that is missed, or wrongly measured, would shift all columns beyond it. Bands alternate; what the

@@ -14,8 +14,12 @@ class Debander {
   /// @param depth_m 32FC1 m of a flat wall, NaN invalid; corrected in place
   /// @return number of steps found
   int remove_bands(cv::Mat* depth_m);
-  /// What was taken off each column [1/m].
-  const std::vector<double>& band_per_m() const { return band_per_m_; }
+  /// Of the newest image: the reading jumps by this much from the column before to this one.
+  struct Step {
+    int column;
+    double step_per_m;
+  };
+  const std::vector<Step>& steps() const { return steps_; }
 
  private:
   void average_columns(const cv::Mat& depth_m, int first_row, int last_row);
@@ -24,6 +28,7 @@ class Debander {
 
   double error_per_m_ = 0.0;
   std::vector<double> column_per_m_, step_per_m_, band_per_m_;
+  std::vector<Step> steps_;
   std::vector<float> values_;
 };
 

@@ -9,11 +9,12 @@
 namespace knav {
 namespace {
 
-// The noise field: a torus that each frame reads from another place. White noise under a box of 8 x 11 px, as
-// the device matches blocks, gives after quantisation what the real walls in realdata show along rows
-// (autocorrelation 0.66 at 1 px, 0.29 at 4, -0.07 at 8) and along columns (0.72, 0.42, 0.15).
+// The noise field: a torus that each frame reads from another place. White noise under a box of 8 x 8 px, as
+// the device matches blocks. After quantisation and with the bands that gives what the real walls in realdata
+// show, along rows and along columns, at any size of patch: the correlation falls straight to a kink at 8 px.
+// What is left beyond it along columns (0.11 on patches of 64 px) are the bands.
 constexpr int kFieldWidth = 1024, kFieldHeight = 512;
-constexpr int kBoxWidth = 8, kBoxHeight = 11;
+constexpr int kBoxWidth = 8, kBoxHeight = 8;
 constexpr double kFieldUnit = 1.0 / 4096.0;  ///< codes per count
 
 constexpr float kBandCentre_px = 320.5f;

@@ -21,6 +21,8 @@ namespace {
 constexpr double kAgree = 0.20;
 constexpr int kRoomEvery = 6;
 constexpr double kLeastTiles = 200;  // fewer say nothing
+constexpr int kLeastPatches = 50;
+constexpr double kSlanted_deg = 30.0;
 
 const char* const kHelp =
     R"(REALDATA holds kinect_walls/device_{a,b}/*-d.png (raw 11-bit disparity of flat walls) and
@@ -128,21 +130,14 @@ class Comparison {
   }
 
   nlohmann::json report() {
-    add("walls: residual sd [codes]", walls_[0].residual_sd_codes(), walls_[1].residual_sd_codes());
-    for (int i = 0; i < 3; ++i) {
-      add(fmt::format("walls: autocorrelation at {} px",
-                      SensorStatistics::kLags_px[static_cast<std::size_t>(i)]),
-          walls_[0].autocorrelation(i), walls_[1].autocorrelation(i));
-    }
+    add_noise("walls", walls_[0].noise(), walls_[1].noise());
     add("walls: step between bands, rms [codes]", walls_[0].band_step_codes(), walls_[1].band_step_codes());
     add("walls: steps between bands per frame", walls_[0].bands_per_frame(), walls_[1].bands_per_frame());
     add("walls: distinct levels per code", walls_[0].levels_per_code(), walls_[1].levels_per_code());
-    add("room: residual sd [codes]", room_[0].residual_sd_codes(), room_[1].residual_sd_codes());
-    for (int i = 0; i < 3; ++i) {
-      add(fmt::format("room: autocorrelation at {} px",
-                      SensorStatistics::kLags_px[static_cast<std::size_t>(i)]),
-          room_[0].autocorrelation(i), room_[1].autocorrelation(i));
-    }
+    // The same patches as the room's, so that the two can be compared.
+    add_noise("walls, patches of 32 px", walls_by_32_[0].noise(), walls_by_32_[1].noise());
+    add_noise("room, 0-30 deg", room_[0].noise(0, kSlanted_deg), room_[1].noise(0, kSlanted_deg));
+    add_noise("room, 30-80 deg", room_[0].noise(kSlanted_deg, 80), room_[1].noise(kSlanted_deg, 80));
     add("room: distinct levels per code", room_[0].levels_per_code(), room_[1].levels_per_code());
     add_valid("walls", walls_);
     add_valid("room", room_);
@@ -168,6 +163,8 @@ class Comparison {
       view.sense(plane.distance_m, plane.tilt_x, plane.tilt_y, &simulated);
       walls_[0].add(real, device.camera);
       walls_[1].add(simulated, view.camera());
+      walls_by_32_[0].add(real, device.camera);
+      walls_by_32_[1].add(simulated, view.camera());
       shown_[0] = real;
       shown_[1] = simulated;
     }
@@ -183,6 +180,20 @@ class Comparison {
                      : fmt::format("ratio {:.2f} {}", ratio, agrees ? "" : "DIFFERS"));
     rows_.push_back(
         {{"name", name}, {"real", real}, {"simulated", simulated}, {"ratio", ratio}, {"agrees", agrees}});
+  }
+
+  void add_noise(const std::string& scene, const SensorStatistics::Noise& real,
+                 const SensorStatistics::Noise& simulated) {
+    if (real.patches < kLeastPatches || simulated.patches < kLeastPatches) return;
+    add(scene + ": residual sd [codes]", real.sd_codes, simulated.sd_codes);
+    for (const bool rows : {true, false}) {
+      for (std::size_t i = 0; i < SensorStatistics::kLags_px.size(); ++i) {
+        add(fmt::format("{}: autocorrelation at {} px {}", scene, SensorStatistics::kLags_px[i],
+                        rows ? "along rows" : "down columns"),
+            rows ? real.along_rows[i] : real.down_columns[i],
+            rows ? simulated.along_rows[i] : simulated.down_columns[i]);
+      }
+    }
   }
 
   void add_valid(const std::string& scene, const SensorStatistics (&both)[2]) {
@@ -201,7 +212,8 @@ class Comparison {
 
   std::string realdata_;
   std::uint64_t seed_;
-  SensorStatistics walls_[2] = {{64, true}, {64, true}}, room_[2] = {{32, false}, {32, false}};
+  SensorStatistics walls_[2] = {{64, true}, {64, true}}, walls_by_32_[2] = {{32, true}, {32, true}},
+                   room_[2] = {{32, false}, {32, false}};
   cv::Mat shown_[2];
   nlohmann::json rows_ = nlohmann::json::array();
 };

@@ -15,8 +15,9 @@ namespace {
 
 constexpr int kBorder_px = 16;  // a real Kinect's last columns never answer
 constexpr int kTile_px = 16;
-constexpr double kFlat_codes = 1.5;  ///< rms about a surface above which a piece is not flat
-constexpr double kPatchFill = 0.98;  ///< of its pixels must answer
+constexpr double kFlat_codes = 1.5;   ///< rms about a surface above which a piece is not flat
+constexpr double kPlane_codes = 0.8;  ///< rms about a plane above which a patch's surroundings are no plane
+constexpr double kPatchFill = 0.98;   ///< of its pixels must answer
 constexpr double kTileFill = 0.3;
 
 /// Least squares fit of a surface with the given terms to the readings of a window; residuals, NaN where
@@ -69,17 +70,41 @@ double rms(const cv::Mat& residual) {
   return std::sqrt(sum / std::max(1.0, count));
 }
 
-double correlation_at(const cv::Mat& residual, int lag, double sd) {
+/// Of the residuals with those `across` columns to the right and `down` rows below.
+double correlation_at(const cv::Mat& residual, int across, int down, double sd) {
   double sum = 0.0, count = 0.0;
-  for (int v = 0; v < residual.rows; ++v) {
-    for (int u = 0; u + lag < residual.cols; ++u) {
-      const double product = static_cast<double>(residual.at<float>(v, u)) * residual.at<float>(v, u + lag);
+  for (int v = 0; v + down < residual.rows; ++v) {
+    for (int u = 0; u + across < residual.cols; ++u) {
+      const double product =
+          static_cast<double>(residual.at<float>(v, u)) * residual.at<float>(v + down, u + across);
       if (std::isnan(product)) continue;
       sum += product;
       count += 1.0;
     }
   }
   return sum / std::max(1.0, count) / (sd * sd);
+}
+
+/// A window of the image as a plane: 1 / z = gradient . ray, and the gradient is its normal.
+struct WindowPlane {
+  double depth_m = 0.0, incidence_deg = 0.0;  ///< in the window's middle
+  double rms_codes = 0.0, fill = 0.0;
+};
+bool fit_plane(const cv::Mat& codes, const cv::Rect& window, const PinholeModel& camera, double least_fill,
+               WindowPlane* plane) {
+  const auto ray = [&](double du, double dv) {
+    return Eigen::Vector3d((window.x + du - camera.cx_px) / camera.fx_px,
+                           (window.y + dv - camera.cy_px) / camera.fy_px, 1.0);
+  };
+  Eigen::Vector3d gradient;
+  cv::Mat residual;
+  if (!fit_surface<3>(codes(window), least_fill, ray, &gradient, &residual, &plane->fill)) return false;
+  const Eigen::Vector3d middle = ray(0.5 * window.width, 0.5 * window.height);
+  const double cosine = std::abs(gradient.dot(middle)) / (gradient.norm() * middle.norm());
+  plane->rms_codes = rms(residual);
+  plane->depth_m = 1.0 / (kInverseDepthPerCode * gradient.dot(middle));
+  plane->incidence_deg = std::acos(std::min(1.0, cosine)) * 180.0 / kPi;
+  return true;
 }
 
 int bin_of(double value, const double* edges, int bins) {
@@ -104,53 +129,48 @@ cv::Mat codes_of(const cv::Mat& depth_m) {
 void SensorStatistics::add(const cv::Mat& depth_m, const PinholeModel& camera) {
   ++frames_;
   const cv::Mat codes = codes_of(depth_m);
-  add_patches(codes);
+  add_patches(codes, camera);
   add_tiles(codes, camera);
   add_levels(codes);
   if (walls_) add_bands(depth_m);
 }
 
-void SensorStatistics::add_patches(const cv::Mat& codes) {
+void SensorStatistics::add_patches(const cv::Mat& codes, const PinholeModel& camera) {
   Eigen::Matrix<double, 6, 1> surface;
   cv::Mat residual;
   double fill = 0.0;
-  for (int v = 0; v + patch_px_ <= codes.rows; v += patch_px_) {
-    for (int u = kBorder_px; u + patch_px_ <= codes.cols - kBorder_px; u += patch_px_) {
-      const cv::Mat window = codes(cv::Rect(u, v, patch_px_, patch_px_));
-      if (!fit_surface<6>(window, kPatchFill, quadratic_terms, &surface, &residual, &fill)) continue;
+  const int margin = walls_ ? 0 : patch_px_ / 2;  // of what has to be a plane around the patch
+  for (int v = margin; v + patch_px_ + margin <= codes.rows; v += patch_px_) {
+    for (int u = kBorder_px + margin; u + patch_px_ + margin <= codes.cols - kBorder_px; u += patch_px_) {
+      const cv::Rect window(u, v, patch_px_, patch_px_);
+      if (!fit_surface<6>(codes(window), kPatchFill, quadratic_terms, &surface, &residual, &fill)) continue;
       const double sd = rms(residual);
       if (sd > kFlat_codes || sd < 1e-3) continue;
-      sd_.push_back(sd);
+      const int side = patch_px_ + 2 * margin;
+      WindowPlane plane;
+      if (!fit_plane(codes, {u - margin, v - margin, side, side}, camera, 0.9, &plane)) continue;
+      if (!walls_ && plane.rms_codes > kPlane_codes) continue;
+      Patch patch = {plane.incidence_deg, sd, {}, {}};
       for (std::size_t i = 0; i < kLags_px.size(); ++i) {
-        correlation_[i].push_back(correlation_at(residual, kLags_px[i], sd));
+        patch.along_rows[i] = correlation_at(residual, kLags_px[i], 0, sd);
+        patch.down_columns[i] = correlation_at(residual, 0, kLags_px[i], sd);
       }
+      patches_.push_back(patch);
     }
   }
 }
 
 void SensorStatistics::add_tiles(const cv::Mat& codes, const PinholeModel& camera) {
-  Eigen::Vector3d gradient;
-  cv::Mat residual;
-  double fill = 0.0;
+  WindowPlane plane;
   for (int v = 0; v + kTile_px <= codes.rows; v += kTile_px) {
     for (int u = kBorder_px; u + kTile_px <= codes.cols - kBorder_px; u += kTile_px) {
-      // A plane is linear in inverse depth: 1 / z = gradient . ray, and the gradient is its normal.
-      const auto ray = [&](double du, double dv) {
-        return Eigen::Vector3d((u + du - camera.cx_px) / camera.fx_px, (v + dv - camera.cy_px) / camera.fy_px,
-                               1.0);
-      };
-      const cv::Mat window = codes(cv::Rect(u, v, kTile_px, kTile_px));
-      if (!fit_surface<3>(window, kTileFill, ray, &gradient, &residual, &fill)) continue;
-      if (rms(residual) > kFlat_codes) continue;
-      const Eigen::Vector3d middle = ray(0.5 * kTile_px, 0.5 * kTile_px);
-      const double depth_m = 1.0 / (kInverseDepthPerCode * gradient.dot(middle));
-      const double cosine = std::abs(gradient.dot(middle)) / (gradient.norm() * middle.norm());
-      const int i = bin_of(depth_m, kDepth_m.data(), kDepthBins);
-      const int j =
-          bin_of(std::acos(std::min(1.0, cosine)) * 180.0 / kPi, kIncidence_deg.data(), kIncidenceBins);
+      if (!fit_plane(codes, {u, v, kTile_px, kTile_px}, camera, kTileFill, &plane)) continue;
+      if (plane.rms_codes > kFlat_codes) continue;
+      const int i = bin_of(plane.depth_m, kDepth_m.data(), kDepthBins);
+      const int j = bin_of(plane.incidence_deg, kIncidence_deg.data(), kIncidenceBins);
       if (i < 0 || j < 0) continue;
       valid_tiles_[i][j] += 1.0;
-      valid_sum_[i][j] += fill;
+      valid_sum_[i][j] += plane.fill;
     }
   }
 }
@@ -159,10 +179,9 @@ void SensorStatistics::add_bands(const cv::Mat& depth_m) {
   Debander debander;
   cv::Mat copy = depth_m.clone();
   debander.remove_bands(&copy);
-  const std::vector<double>& band = debander.band_per_m();
-  for (std::size_t u = kBorder_px; u + kBorder_px < band.size(); ++u) {
-    const double step = (band[u] - band[u - 1]) / kInverseDepthPerCode;
-    if (std::abs(step) > 1e-6) band_steps_.push_back(step);
+  for (const Debander::Step& step : debander.steps()) {
+    if (step.column >= kBorder_px && step.column + kBorder_px < depth_m.cols)
+      band_steps_.push_back(step.step_per_m / kInverseDepthPerCode);
   }
 }
 
@@ -184,9 +203,26 @@ void SensorStatistics::add_levels(const cv::Mat& codes) {
   levels_per_code_.push_back(static_cast<double>(different.size()) / (high - low + 1.0));
 }
 
-double SensorStatistics::residual_sd_codes() const { return quantile(sd_, 0.5); }
-
-double SensorStatistics::autocorrelation(int lag) const { return quantile(correlation_[lag], 0.5); }
+SensorStatistics::Noise SensorStatistics::noise(double from_deg, double to_deg) const {
+  std::vector<double> sd;
+  std::array<std::vector<double>, 3> along_rows, down_columns;
+  for (const Patch& patch : patches_) {
+    if (patch.incidence_deg < from_deg || patch.incidence_deg >= to_deg) continue;
+    sd.push_back(patch.sd_codes);
+    for (std::size_t i = 0; i < kLags_px.size(); ++i) {
+      along_rows[i].push_back(patch.along_rows[i]);
+      down_columns[i].push_back(patch.down_columns[i]);
+    }
+  }
+  Noise noise;
+  noise.patches = static_cast<int>(sd.size());
+  noise.sd_codes = quantile(sd, 0.5);
+  for (std::size_t i = 0; i < kLags_px.size(); ++i) {
+    noise.along_rows[i] = quantile(along_rows[i], 0.5);
+    noise.down_columns[i] = quantile(down_columns[i], 0.5);
+  }
+  return noise;
+}
 
 double SensorStatistics::band_step_codes() const {
   double sum = 0.0;

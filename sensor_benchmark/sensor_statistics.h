@@ -20,16 +20,24 @@ class SensorStatistics {
   static constexpr std::array<int, 3> kLags_px = {1, 4, 8};
 
   /// @param patch_px side of the patches that a quadratic surface is fitted to
-  /// @param walls    the frames show one flat wall each: look for vertical bands too
+  /// @param walls    the frames show one flat wall each: look for vertical bands too. Else only patches in
+  /// the
+  ///                 middle of a plane twice their size tell of the noise: cloth, edges and clutter have a
+  ///                 relief
   SensorStatistics(int patch_px, bool walls) : patch_px_(patch_px), walls_(walls) {}
   /// @param depth_m 32FC1 m, NaN invalid
   void add(const cv::Mat& depth_m, const PinholeModel& camera);
 
   int frames() const { return frames_; }
-  int patches() const { return static_cast<int>(sd_.size()); }
-  double residual_sd_codes() const;       ///< median over flat patches
-  double autocorrelation(int lag) const;  ///< along rows; lag is an index of kLags_px
-  double band_step_codes() const;         ///< rms of the steps between vertical bands; NaN without walls
+  /// Of flat patches: medians of the residuals' sd and of their autocorrelation at kLags_px.
+  struct Noise {
+    int patches = 0;
+    double sd_codes = 0.0;
+    std::array<double, 3> along_rows{}, down_columns{};
+  };
+  /// Of the patches that the rays meet at these angles off square; NaN if there are none.
+  Noise noise(double from_deg = 0.0, double to_deg = 90.0) const;
+  double band_step_codes() const;  ///< rms of the steps between vertical bands; NaN without walls
   double bands_per_frame() const;
   /// Different readings per code between the 1st and the 99th percentile of all readings.
   double levels_per_code() const;
@@ -40,7 +48,7 @@ class SensorStatistics {
   Valid valid(int depth_bin, int incidence_bin) const;
 
  private:
-  void add_patches(const cv::Mat& codes);
+  void add_patches(const cv::Mat& codes, const PinholeModel& camera);
   void add_tiles(const cv::Mat& codes, const PinholeModel& camera);
   void add_bands(const cv::Mat& depth_m);
   void add_levels(const cv::Mat& codes);
@@ -48,7 +56,12 @@ class SensorStatistics {
   int patch_px_;
   bool walls_;
   int frames_ = 0;
-  std::vector<double> sd_, correlation_[3], band_steps_, levels_per_code_;
+  struct Patch {
+    double incidence_deg, sd_codes;
+    std::array<double, 3> along_rows, down_columns;
+  };
+  std::vector<Patch> patches_;
+  std::vector<double> band_steps_, levels_per_code_;
   double valid_sum_[kDepthBins][kIncidenceBins] = {}, valid_tiles_[kDepthBins][kIncidenceBins] = {};
 };
 

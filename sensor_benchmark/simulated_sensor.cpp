@@ -8,6 +8,32 @@ namespace {
 
 constexpr double kLowestObstacle_m = 0.01;
 
+/// Calls visit(column of the levelled camera, distance along its forward axis [m], height above the floor
+/// [m]) for every reading; what is not a number or not positive is none.
+template <class Visit>
+void for_each_reading(const cv::Mat& depth_m, const PinholeModel& camera,
+                      const Eigen::Isometry3d& T_base_optical, const Visit& visit) {
+  const Eigen::Vector3d origin = T_base_optical.translation();
+  Eigen::Vector3d forward = T_base_optical.linear().col(2);
+  forward.z() = 0.0;
+  forward.normalize();
+  const Eigen::Vector3d right = forward.cross(Eigen::Vector3d::UnitZ());
+  for (int v = 0; v < camera.height_px; ++v) {
+    const float* row = depth_m.ptr<float>(v);
+    const double y = (v - camera.cy_px) / camera.fy_px;
+    for (int u = 0; u < camera.width_px; ++u) {
+      if (!(row[u] > 0.0f)) continue;
+      const Eigen::Vector3d ray((u - camera.cx_px) / camera.fx_px, y, 1.0);
+      const Eigen::Vector3d point = T_base_optical.linear() * ray * static_cast<double>(row[u]);
+      const double along = forward.dot(point);
+      if (along <= 0.0) continue;
+      const long column = std::lround(camera.cx_px + camera.fx_px * right.dot(point) / along);
+      if (column < 0 || column >= camera.width_px) continue;
+      visit(static_cast<std::size_t>(column), along, point.z() + origin.z());
+    }
+  }
+}
+
 }  // namespace
 
 SimulatedSensor::SimulatedSensor(const WorldConfig& world, const KinectConfig& kinect, std::uint64_t seed,
@@ -58,27 +84,21 @@ void SimulatedSensor::true_depth(const Eigen::Isometry3d& T_world_optical, cv::M
 void true_profile(const cv::Mat& true_depth_m, const PinholeModel& camera,
                   const Eigen::Isometry3d& T_base_optical, double slice_top_m, std::vector<float>* z_m) {
   z_m->assign(static_cast<std::size_t>(camera.width_px), std::numeric_limits<float>::quiet_NaN());
-  const Eigen::Vector3d origin = T_base_optical.translation();
-  Eigen::Vector3d forward = T_base_optical.linear().col(2);
-  forward.z() = 0.0;
-  forward.normalize();
-  const Eigen::Vector3d right = forward.cross(Eigen::Vector3d::UnitZ());
-  for (int v = 0; v < camera.height_px; ++v) {
-    const float* row = true_depth_m.ptr<float>(v);
-    const double y = (v - camera.cy_px) / camera.fy_px;
-    for (int u = 0; u < camera.width_px; ++u) {
-      if (std::isnan(row[u])) continue;
-      const Eigen::Vector3d ray((u - camera.cx_px) / camera.fx_px, y, 1.0);
-      const Eigen::Vector3d point = T_base_optical.linear() * ray * static_cast<double>(row[u]);
-      const double height = point.z() + origin.z();
-      if (height < kLowestObstacle_m || height > slice_top_m) continue;
-      const double along = forward.dot(point);
-      const long column = std::lround(camera.cx_px + camera.fx_px * right.dot(point) / along);
-      if (along <= 0.0 || column < 0 || column >= camera.width_px) continue;
-      float& nearest = (*z_m)[static_cast<std::size_t>(column)];
-      if (!(nearest <= along)) nearest = static_cast<float>(along);
-    }
-  }
+  for_each_reading(true_depth_m, camera, T_base_optical,
+                   [&](std::size_t column, double along_m, double height_m) {
+                     if (height_m < kLowestObstacle_m || height_m > slice_top_m) return;
+                     float& nearest_m = (*z_m)[column];
+                     if (!(nearest_m <= along_m)) nearest_m = static_cast<float>(along_m);
+                   });
+}
+
+void readings_between(const cv::Mat& depth_m, const PinholeModel& camera,
+                      const Eigen::Isometry3d& T_base_optical, double bottom_m, double top_m,
+                      std::vector<int>* readings) {
+  readings->assign(static_cast<std::size_t>(camera.width_px), 0);
+  for_each_reading(depth_m, camera, T_base_optical, [&](std::size_t column, double, double height_m) {
+    if (height_m > bottom_m && height_m < top_m) ++(*readings)[column];
+  });
 }
 
 }  // namespace knav

@@ -48,4 +48,10 @@ class SimulatedSensor {
 void true_profile(const cv::Mat& true_depth_m, const PinholeModel& camera,
                   const Eigen::Isometry3d& T_base_optical, double slice_top_m, std::vector<float>* z_m);
 
+/// How many readings, true or sensed, of each column of the levelled camera lie between two heights above the
+/// floor.
+void readings_between(const cv::Mat& depth_m, const PinholeModel& camera,
+                      const Eigen::Isometry3d& T_base_optical, double bottom_m, double top_m,
+                      std::vector<int>* readings);
+
 }  // namespace knav

@@ -158,6 +158,12 @@ TEST(Debander, RemovesStepsAndKeepsTheSmoothError) {
   cv::Mat depth = wall(2.0, 4, banded);
   Debander debander;
   EXPECT_EQ(debander.remove_bands(&depth), 7);  // 640 / 83 columns
+  ASSERT_EQ(debander.steps().size(), 7u);
+  for (std::size_t i = 0; i < 7; ++i) {
+    EXPECT_NEAR(debander.steps()[i].column, 83.0 * static_cast<double>(i + 1), 3.0);
+    EXPECT_NEAR(std::abs(debander.steps()[i].step_per_m), 0.8 * kInverseDepthPerCode,
+                0.2 * kInverseDepthPerCode);
+  }
   // At each edge between bands, of 0.8 codes: what 16 columns on the right say less 16 on the left.
   const cv::Mat clean = wall(2.0, 4, {});
   const auto mean_per_m = [](const cv::Mat& image, int first, int last) {

@@ -53,6 +53,19 @@ TEST(TrueProfile, IsTheNearestThingBetweenFloorAndTwoMetres) {
   }
 }
 
+TEST(ReadingsBetween, CountsRowsByHeightAndTellsAShadowFromAThing) {
+  // A wall at 2 m, camera 0.5 m up: row v sees it at 0.5 - 2 (v - 239.5) / 585 m, so 0.1 to 0.4 m is 88 rows:
+  // 269 to 356. Columns 100 to 109 do not answer.
+  cv::Mat depth_m(480, 640, CV_32FC1, cv::Scalar(2.0));
+  depth_m.colRange(100, 110).setTo(0.0);
+  const Eigen::Isometry3d pose = optical_frame(camera_mount({0.0, 0.0, 0.5}, 0.0, 0.0, 0.0));
+  std::vector<int> readings;
+  readings_between(depth_m, kinect_camera(), pose, 0.1, 0.4, &readings);
+  for (std::size_t u = 0; u < 640; ++u) {
+    EXPECT_EQ(readings[u], u >= 100 && u < 110 ? 0 : 88) << u;
+  }
+}
+
 TEST(SensorStatistics, MeasuresNoiseThatIsKnown) {
   // White noise of 1.2 codes on a wall 2 m off: sd 1.2, no correlation, a level for every code.
   cv::Mat depth_m(480, 640, CV_32FC1);
@@ -65,11 +78,34 @@ TEST(SensorStatistics, MeasuresNoiseThatIsKnown) {
   }
   SensorStatistics statistics(64, true);
   statistics.add(depth_m, kinect_camera());
-  EXPECT_NEAR(statistics.residual_sd_codes(), 1.2, 0.03);
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(statistics.autocorrelation(i), 0.0, 0.03);
+  const SensorStatistics::Noise noise = statistics.noise();
+  EXPECT_GT(noise.patches, 50);
+  EXPECT_NEAR(noise.sd_codes, 1.2, 0.03);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(noise.along_rows[i], 0.0, 0.03);
+    EXPECT_NEAR(noise.down_columns[i], 0.0, 0.03);
+  }
   EXPECT_NEAR(statistics.levels_per_code(), 1.0, 0.15);
   const SensorStatistics::Valid valid = statistics.valid(2, 0);  // 2 m: from 2 to 4, square on
   EXPECT_GT(statistics.valid(1, 0).tiles + valid.tiles, 100.0);
+  EXPECT_EQ(statistics.bands_per_frame(), 0.0);
+}
+
+TEST(SensorStatistics, CountsBandsNotTheSmoothPartBetweenThem) {
+  // Columns in groups of 80, a code up and a code down in turn: seven steps of one code each.
+  cv::Mat depth_m(480, 640, CV_32FC1);
+  RandomStream random(2, random_stream::kTest, 0, 0);
+  for (int v = 0; v < 480; ++v) {
+    for (int u = 0; u < 640; ++u) {
+      const double band = (u / 80) % 2 == 0 ? -0.5 : 0.5, bow = 1e-5 * (u - 320) * (u - 320);
+      depth_m.at<float>(v, u) =
+          static_cast<float>(351.0 / std::round(175.5 + bow + band + 0.5 * random.normal()));
+    }
+  }
+  SensorStatistics statistics(64, true);
+  statistics.add(depth_m, kinect_camera());
+  EXPECT_EQ(statistics.bands_per_frame(), 7.0);
+  EXPECT_NEAR(statistics.band_step_codes(), 1.0, 0.1);
 }
 
 /// A short run of the benchmark: what the whole one asks holds for one device too.
