@@ -5,6 +5,7 @@
 
 #include "core/quantile.h"
 #include "core/random.h"
+#include "kinect_calib/deband.h"
 #include "sensor_benchmark/device_calibration.h"
 #include "sensor_benchmark/scene_runner.h"
 #include "sensor_benchmark/sections.h"
@@ -106,6 +107,42 @@ TEST(SensorStatistics, CountsBandsNotTheSmoothPartBetweenThem) {
   statistics.add(depth_m, kinect_camera());
   EXPECT_EQ(statistics.bands_per_frame(), 7.0);
   EXPECT_NEAR(statistics.band_step_codes(), 1.0, 0.1);
+}
+
+/// Turn of a wall about the vertical [deg]: slope of mean inverse depth over x.
+double turn_deg(const cv::Mat& depth_m) {
+  const PinholeModel camera = kinect_camera();
+  double n = 0.0, x_sum = 0.0, xx = 0.0, y_sum = 0.0, xy = 0.0;
+  for (int v = 0; v < depth_m.rows; ++v) {
+    for (int u = 0; u < depth_m.cols; ++u) {
+      const double x = (u - camera.cx_px) / camera.fx_px, y = 1.0 / depth_m.at<float>(v, u);
+      if (std::isnan(y)) continue;
+      n += 1.0;
+      x_sum += x;
+      xx += x * x;
+      y_sum += y;
+      xy += x * y;
+    }
+  }
+  const double slope = (xy - x_sum * y_sum / n) / (xx - x_sum * x_sum / n);
+  return std::atan(slope / (y_sum / n)) * 180.0 / M_PI;
+}
+
+TEST(Debander, TakesTheSimulatedBandsOutWithoutTurningTheWall) {
+  // The bands are a staircase of up to 17 codes across the image, which creeps back between its steps: to
+  // take the steps for constant offsets turned a wall at 4 m by many degrees.
+  std::size_t steps = 0;
+  for (const double distance_m : {0.8, 1.4, 2.5, 4.0}) {
+    WallView view(KinectConfig::preset("default"), 5, 103);
+    cv::Mat depth_m;
+    view.sense(distance_m, 0.02, 0.0, &depth_m);
+    const double before_deg = turn_deg(depth_m);
+    Debander debander;
+    debander.remove_bands(&depth_m);
+    steps += debander.steps().size();
+    EXPECT_NEAR(turn_deg(depth_m), before_deg, 0.1) << distance_m;
+  }
+  EXPECT_GT(steps, 20u);
 }
 
 /// A short run of the benchmark: what the whole one asks holds for one device too.
