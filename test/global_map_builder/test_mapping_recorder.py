@@ -17,6 +17,8 @@ from tf2_msgs.msg import TFMessage
 class MappingRecorder(unittest.TestCase):
     def test_recording_holds_the_mount_from_before_the_first_stamp(self):
         path = rospy.get_param("/mapping_recorder/bag")
+        if os.path.exists(path):  # of a run that was stopped
+            os.remove(path)
         mount = TransformStamped()
         mount.header.frame_id, mount.child_frame_id = "base_link", "camera_link"
         mount.transform.translation.x, mount.transform.rotation.w = 0.05, 1.0
@@ -27,7 +29,7 @@ class MappingRecorder(unittest.TestCase):
         clock = rospy.Publisher("/clock", Clock, queue_size=10)
         odometry = rospy.Publisher("odom", Odometry, queue_size=10)
         self.wait(lambda: clock.get_num_connections() > 0 and odometry.get_num_connections() > 0)
-        for i in range(20):
+        for i in range(40):
             stamp = rospy.Time(100 + 0.05 * i)
             clock.publish(Clock(stamp))
             message = Odometry()
@@ -38,9 +40,9 @@ class MappingRecorder(unittest.TestCase):
         self.wait(lambda: os.path.exists(path))
         try:
             with rosbag.Bag(path) as bag:
+                self.assertGreater(bag.get_message_count("/odom"), 5)
                 recorded = [m for _, m, _ in bag.read_messages(topics=["/tf_static"])]
                 self.assertEqual([t.child_frame_id for m in recorded for t in m.transforms], ["camera_link"])
-                self.assertGreater(bag.get_message_count("/odom"), 5)
         finally:
             os.remove(path)
 
