@@ -80,13 +80,8 @@ std::map<std::string, Pose2> choose_places(const FloorPlan& plan, const WorldCon
 
 std::string make_tour(const FloorPlan& plan, const WorldConfig& world,
                       const std::map<std::string, Pose2>& places, double spacing_m) {
-  struct Stop {
-    Point2 at;
-    bool look = true;
-    double yaw_deg = 0.0;
-  };
-  std::vector<Stop> stops;
-  for (const auto& [name, pose] : places) stops.push_back({position(pose), true, pose.yaw_rad * 180.0 / kPi});
+  std::vector<Point2> stops;
+  for (const auto& [name, pose] : places) stops.push_back(position(pose));
   const Point2 home = position(world.spawn);
   // Farthest points first, until nothing that can be reached is far from a stop.
   const std::vector<Point2> open = plan.reachable(kStopClearance_m);
@@ -95,11 +90,11 @@ std::string make_tour(const FloorPlan& plan, const WorldConfig& world,
     for (std::size_t i = 0; i < open.size(); ++i) far[i] = std::min(far[i], distance_m(open[i], p));
   };
   cover(home);
-  for (const Stop& stop : stops) cover(stop.at);
+  for (const Point2& stop : stops) cover(stop);
   while (!open.empty()) {
     const auto worst = static_cast<std::size_t>(std::max_element(far.begin(), far.end()) - far.begin());
     if (far[worst] < spacing_m) break;
-    stops.push_back({open[worst], true, 0.0});
+    stops.push_back(open[worst]);
     cover(open[worst]);
   }
   std::string text = fmt::format(
@@ -115,12 +110,12 @@ std::string make_tour(const FloorPlan& plan, const WorldConfig& world,
   while (!stops.empty()) {
     // The nearest by the way one must drive; straight distance bounds how many are asked.
     std::sort(stops.begin(), stops.end(),
-              [&](const Stop& a, const Stop& b) { return distance_m(at, a.at) < distance_m(at, b.at); });
+              [&](const Point2& a, const Point2& b) { return distance_m(at, a) < distance_m(at, b); });
     std::size_t best = stops.size();
     double best_m = 1e9;
     std::vector<Point2> best_way;
-    for (std::size_t i = 0; i < stops.size() && distance_m(at, stops[i].at) < best_m; ++i) {
-      std::vector<Point2> way = plan.path(at, stops[i].at);
+    for (std::size_t i = 0; i < stops.size() && distance_m(at, stops[i]) < best_m; ++i) {
+      std::vector<Point2> way = plan.path(at, stops[i]);
       if (way.size() < 2 || length_m(way) >= best_m) continue;
       best_m = length_m(way);
       best_way = std::move(way);
@@ -129,7 +124,7 @@ std::string make_tour(const FloorPlan& plan, const WorldConfig& world,
     if (best == stops.size()) break;  // none of them can be reached
     drive(best_way);
     text += "  - turn: 360\n";
-    at = stops[best].at;
+    at = stops[best];
     stops.erase(stops.begin() + static_cast<std::ptrdiff_t>(best));
   }
   const std::vector<Point2> back = plan.path(at, home);

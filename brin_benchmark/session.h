@@ -44,7 +44,6 @@ class BenchmarkSession {
 
   /// The results of all runs in the folder, in order.
   std::vector<RunResult> results() const;
-  const BenchmarkSetup& setup() const { return setup_; }
 
  private:
   std::vector<std::size_t> missing_runs() const;
