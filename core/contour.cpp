@@ -116,6 +116,7 @@ RayEnd cast(const TsdfGrid& grid, const ContourConfig& config, const FreeBlocks*
   const Along length = along(length_m), blind = along(config.blind_radius_m),
               gap = along(config.unknown_gap_m);
   const std::uint32_t* const quads = grid.quads();
+  const SurfaceRule rule(config.surface_within);
   QuadWalk walk(x, y, dir_x, dir_y);
   Along entered = 0;       // where the ray entered the present quad
   Along unknown_from = 0;  // where the present stretch of unknown began
@@ -168,6 +169,10 @@ RayEnd cast(const TsdfGrid& grid, const ContourConfig& config, const FreeBlocks*
           positive_iy = walk.iy;
         } else {
           if (positive_at >= 0) {
+            if (!rule.near_in(quad) && !rule.near_in(quads[grid.quad_index(positive_ix, positive_iy)])) {
+              end.range_m = static_cast<float>(cells_of(t) * grid.resolution_m());  // into a shadow: unknown
+              return end;
+            }
             const float before = value_at(positive_ix, positive_iy, positive_at);
             const double share = before > value ? static_cast<double>(-value / (before - value)) : 0.0;
             const double back = cells_of(t - positive_at) * share;

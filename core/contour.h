@@ -13,6 +13,7 @@ struct ContourConfig {
   double range_max_m = 20.0;
   double blind_radius_m = 1.5;
   double unknown_gap_m = 0.15;
+  double surface_within = 0.35;
   double evidence_decay_s = 30.0;
   bool merge_newest = true;
 
@@ -23,11 +24,30 @@ struct ContourConfig {
     v.number("blind_radius_m", blind_radius_m, 0, 10, "m",
              "Cells never seen this near to the robot do not end a ray; farther out they make it unknown.");
     v.number("unknown_gap_m", unknown_gap_m, 0, 2, "m", "A ray may cross unknown cells for this length.");
+    v.number("surface_within", surface_within, 0.05, 1, "",
+             "F must come this near to 0 beside a change of its sign for a surface to be there; elsewhere it is the edge "
+             "of what a surface hides. 1: any change of sign (the paper's).");
     v.number("evidence_decay_s", evidence_decay_s, 0.1, 10000, "s",
              "A ray's evidence is exp(-age / this), age by the window's clock.");
     v.flag("merge_newest", merge_newest,
            "Replace the section that the newest profile covers by its readings.");
   }
+};
+
+/// A change of F's sign is a surface only where F was measured near 0. Beside the last column that meets a wall, free
+/// space borders on cells that this column passed on its way into the wall, whose F is -0.4 or -1: there is a shadow's
+/// edge, not a surface. Taken for one it narrows every door that the robot drives up to along its wall.
+struct SurfaceRule {
+  explicit SurfaceRule(double surface_within) : limit(static_cast<int>(surface_within * TsdfGrid::kValueScale)) {}
+  bool near(int value) const { return value != TsdfGrid::kUnknown && value <= limit && value >= -limit; }
+  /// Any corner of a quad.
+  bool near_in(std::uint32_t quad) const {
+    for (int corner = 0; corner < 4; ++corner) {
+      if (near(static_cast<std::int8_t>((quad >> (8 * corner)) & 0xFFu))) return true;
+    }
+    return false;
+  }
+  int limit;
 };
 
 /// Paper section III.F: the surface seen from a pose. Every cell on each ray is visited, the crossing from

@@ -12,6 +12,7 @@
 #include "global_map_builder/closure_finder.h"
 #include "global_map_builder/contour_distance.h"
 #include "global_map_builder/drive_smoother.h"
+#include "global_map_builder/map_occupancy.h"
 #include "global_map_builder/map_surface.h"
 
 namespace knav {
@@ -54,36 +55,6 @@ void crop(const Crop& c, GridGeometry* g, std::vector<float>* value) {
   }
   *g = out;
   *value = std::move(cut);
-}
-
-void mark_surface(const Contour& contour, OccupancyGrid* grid) {
-  const GridGeometry& g = grid->geometry;
-  for (const Point2& p : sample_contour(contour, 0.25 * g.resolution_m)) {
-    const int ix = g.cell_x(p.x_m), iy = g.cell_y(p.y_m);
-    if (g.contains(ix, iy)) grid->value[g.index(ix, iy)] = 100;
-  }
-}
-
-/// Marks the cells whose centres the robot's body was on.
-void mark_driven(const GridGeometry& g, const Trajectory& trajectory, double radius_m,
-                 std::vector<bool>* driven) {
-  if (radius_m <= 0.0) return;
-  Pose2 last;
-  bool any = false;
-  for (const StampedPose2& pose : trajectory) {
-    const Pose2& T = pose.T_map_robot;
-    if (any && distance_m(last, T) < 0.5 * g.resolution_m) continue;
-    last = T;
-    any = true;
-    for (int iy = g.cell_y(T.y_m - radius_m); iy <= g.cell_y(T.y_m + radius_m); ++iy) {
-      for (int ix = g.cell_x(T.x_m - radius_m); ix <= g.cell_x(T.x_m + radius_m); ++ix) {
-        if (g.contains(ix, iy) &&
-            std::hypot(g.center_x_m(ix) - T.x_m, g.center_y_m(iy) - T.y_m) <= radius_m) {
-          (*driven)[g.index(ix, iy)] = true;
-        }
-      }
-    }
-  }
 }
 
 /// One trajectory in the order of stamps; where two drives' clocks overlap, the newer one's.
@@ -246,21 +217,8 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
     built.odometry.push_back({pose.stamp_s, T_start_odom * pose.T_map_robot});
   }
 
-  map.occupancy.geometry = geometry;
-  map.occupancy.value.assign(value.size(), -1);
-  for (std::size_t i = 0; i < value.size(); ++i) {
-    float& d = map.distance.distance_m[i];
-    if (std::isnan(value[i]) && driven[i]) {
-      map.occupancy.value[i] = 0;
-    } else if (std::isnan(value[i])) {
-      d = std::numeric_limits<float>::quiet_NaN();
-    } else if (value[i] > 0.0f) {
-      map.occupancy.value[i] = 0;
-    } else {
-      d = -d;
-    }
-  }
-  mark_surface(built.contour, &map.occupancy);
+  map.occupancy = occupancy_from_surface(geometry, value, driven, built.contour, config_.min_contour_piece_m,
+                                         &map.distance.distance_m);
   map.keepout.geometry = geometry;
   map.keepout.value.assign(geometry.cell_count(), 0);
   if (built.old_drives > 0) {

@@ -6,7 +6,7 @@
 namespace knav {
 
 void extract_occupancy(const TsdfGrid& grid, double center_x_m, double center_y_m, double size_m,
-                       OccupancyGrid* map) {
+                       const SurfaceRule& rule, OccupancyGrid* map) {
   const int half = static_cast<int>(0.5 * size_m / grid.resolution_m());
   const int low_x = std::max(grid.first_x() + 1, grid.cell_of(center_x_m) - half);
   const int low_y = std::max(grid.first_y() + 1, grid.cell_of(center_y_m) - half);
@@ -26,6 +26,7 @@ void extract_occupancy(const TsdfGrid& grid, double center_x_m, double center_y_
       bool surface = value == 0;
       for (const int other : neighbours) {
         if (other == TsdfGrid::kUnknown || (value > 0) == (other > 0)) continue;
+        if (!rule.near(value) && !rule.near(other)) continue;
         if (std::abs(value) < std::abs(other) || (std::abs(value) == std::abs(other) && value < 0))
           surface = true;
       }

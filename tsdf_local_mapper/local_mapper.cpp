@@ -387,7 +387,7 @@ void LocalMapper::extract_scan_360(RangeScan* scan) const {
 void LocalMapper::extract_local_map(OccupancyGrid* map) const {
   const State& s = *state_;
   extract_occupancy(s.grid, s.result.T_local_base.x_m, s.result.T_local_base.y_m, s.config.local_map_size_m,
-                    map);
+                    SurfaceRule(s.config.contour.surface_within), map);
 }
 
 void LocalMapper::reset() {

@@ -1,0 +1,75 @@
+// What becomes of cells that nobody saw, or that lie behind what was taken for noise: hand-drawn grids.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "global_map_builder/map_occupancy.h"
+
+namespace knav {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+/// '.' seen free, '?' not seen, '-' behind a surface; the first line is the highest row.
+struct Drawn {
+  explicit Drawn(const std::vector<std::string>& rows) {
+    geometry = {static_cast<int>(rows[0].size()), static_cast<int>(rows.size()), 0.05, 0.0, 0.0};
+    for (auto row = rows.rbegin(); row != rows.rend(); ++row) {
+      for (const char c : *row) value_m.push_back(c == '.' ? 0.2f : c == '-' ? -0.02f : kNaN);
+    }
+  }
+  GridGeometry geometry;
+  std::vector<float> value_m;
+};
+
+const Drawn kHoles({
+    "..........",
+    ".?...??...",
+    "..........",
+    "...-..?...",
+    ".....?.??.",
+    "......?...",
+    "?.........",
+});
+
+TEST(LoneHoles, ASingleCellAmidFreeOnesIsOneLargerPiecesAndTheRimAreNot) {
+  const std::vector<bool> hole = lone_holes(kHoles.geometry, kHoles.value_m, 0.25);
+  const auto at = [&](int ix, int iy) { return hole[kHoles.geometry.index(ix, iy)]; };
+  EXPECT_TRUE(at(1, 5));   // unseen
+  EXPECT_TRUE(at(3, 3));   // behind lone noise
+  EXPECT_FALSE(at(5, 5));  // two cells: a rim of six sides, 0.3 m
+  EXPECT_FALSE(at(6, 5));
+  EXPECT_FALSE(at(7, 2));
+  EXPECT_FALSE(at(0, 0));  // open to what lies outside the map
+  EXPECT_TRUE(at(6, 3));   // three single cells, though they touch at their corners
+  EXPECT_TRUE(at(5, 2));
+  EXPECT_TRUE(at(6, 1));
+  const std::vector<bool> wider = lone_holes(kHoles.geometry, kHoles.value_m, 0.3);
+  EXPECT_TRUE(wider[kHoles.geometry.index(5, 5)]);
+  for (const bool any : lone_holes(kHoles.geometry, kHoles.value_m, 0.0)) EXPECT_FALSE(any);
+}
+
+TEST(OccupancyFromSurface, HolesAndDrivenCellsAreFreeTheRestKeepsItsSign) {
+  std::vector<float> distance_m(kHoles.value_m.size(), 0.3f);
+  std::vector<bool> driven(kHoles.value_m.size(), false);
+  driven[kHoles.geometry.index(5, 5)] = true;
+  const Contour contour{{{0.401, 0.301}, {0.449, 0.349}}};  // in cell (8, 6)
+  const OccupancyGrid grid =
+      occupancy_from_surface(kHoles.geometry, kHoles.value_m, driven, contour, 0.25, &distance_m);
+  const auto index = [](int ix, int iy) { return kHoles.geometry.index(ix, iy); };
+  EXPECT_EQ(grid.value[index(0, 6)], 0);
+  EXPECT_EQ(grid.value[index(1, 5)], 0);
+  EXPECT_FLOAT_EQ(distance_m[index(1, 5)], 0.3f);
+  EXPECT_EQ(grid.value[index(3, 3)], 0);
+  EXPECT_FLOAT_EQ(distance_m[index(3, 3)], 0.3f);
+  EXPECT_EQ(grid.value[index(5, 5)], 0);
+  EXPECT_EQ(grid.value[index(6, 5)], -1);
+  EXPECT_TRUE(std::isnan(distance_m[index(6, 5)]));
+  EXPECT_EQ(grid.value[index(8, 6)], 100);
+}
+
+}  // namespace
+}  // namespace knav
