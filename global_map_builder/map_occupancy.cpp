@@ -39,13 +39,12 @@ void mark_driven(const GridGeometry& g, const Trajectory& trajectory, double rad
   }
 }
 
-std::vector<bool> lone_holes(const GridGeometry& g, const std::vector<float>& value_m, double rim_m) {
-  const auto open = [&](std::size_t i) { return value_m[i] > 0.0f; };  // false for NaN
-  std::vector<bool> holes(value_m.size(), false), visited(value_m.size(), false);
+std::vector<bool> lone_holes(const GridGeometry& g, const std::vector<bool>& open, double rim_m) {
+  std::vector<bool> holes(open.size(), false), visited(open.size(), false);
   const auto longest = static_cast<std::size_t>(std::max(0.0, rim_m / g.resolution_m + 1e-6));  // in sides of cells
   std::vector<std::size_t> piece;
-  for (std::size_t first = 0; first < value_m.size(); ++first) {
-    if (open(first) || visited[first]) continue;
+  for (std::size_t first = 0; first < open.size(); ++first) {
+    if (open[first] || visited[first]) continue;
     piece.assign(1, first);
     visited[first] = true;
     std::size_t rim = 0;
@@ -59,7 +58,7 @@ std::vector<bool> lone_holes(const GridGeometry& g, const std::vector<float>& va
           continue;
         }
         const std::size_t beside = g.index(ix + dx, iy + dy);
-        if (open(beside)) {
+        if (open[beside]) {
           ++rim;
         } else if (!visited[beside]) {
           visited[beside] = true;
@@ -76,13 +75,16 @@ std::vector<bool> lone_holes(const GridGeometry& g, const std::vector<float>& va
 OccupancyGrid occupancy_from_surface(const GridGeometry& geometry, const std::vector<float>& value_m,
                                      const std::vector<bool>& driven, const Contour& contour, double rim_m,
                                      std::vector<float>* distance_m) {
-  const std::vector<bool> hole = lone_holes(geometry, value_m, rim_m);
+  std::vector<bool> open(value_m.size());
+  for (std::size_t i = 0; i < open.size(); ++i)
+    open[i] = value_m[i] > 0.0f || (std::isnan(value_m[i]) && driven[i]);
+  const std::vector<bool> hole = lone_holes(geometry, open, rim_m);
   OccupancyGrid occupancy;
   occupancy.geometry = geometry;
   occupancy.value.assign(value_m.size(), -1);
   for (std::size_t i = 0; i < value_m.size(); ++i) {
     float& d = (*distance_m)[i];
-    if (value_m[i] > 0.0f || hole[i] || (std::isnan(value_m[i]) && driven[i])) {
+    if (open[i] || hole[i]) {
       occupancy.value[i] = 0;
     } else {
       d = std::isnan(value_m[i]) ? std::numeric_limits<float>::quiet_NaN() : -d;

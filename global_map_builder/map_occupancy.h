@@ -16,10 +16,11 @@ void mark_driven(const GridGeometry& geometry, const Trajectory& trajectory, dou
 /// Holes in free space whose rim is shorter than `rim_m`: not seen, or behind a piece of contour so short that it was
 /// taken for noise (remove_short_pieces()). What surrounds them says what they are, and a single such cell in a door
 /// closes it to a planner that does not drive into the unknown.
-/// @param value_m  signed distance [m] a cell, NaN = unknown
-std::vector<bool> lone_holes(const GridGeometry& geometry, const std::vector<float>& value_m, double rim_m);
+/// @param open  per cell: seen free, or driven on
+std::vector<bool> lone_holes(const GridGeometry& geometry, const std::vector<bool>& open, double rim_m);
 
 /// Free (0): seen free, driven on, or a lone hole. Occupied (100): the contour runs through it. Else -1.
+/// @param value_m     signed distance [m] a cell, NaN = unknown
 /// @param distance_m  of each cell to the contour [m], unsigned; becomes signed, NaN where unknown
 OccupancyGrid occupancy_from_surface(const GridGeometry& geometry, const std::vector<float>& value_m,
                                      const std::vector<bool>& driven, const Contour& contour, double rim_m,
