@@ -58,6 +58,7 @@ void make_paper(LocalMapperConfig* config) {
   config->filter.alignment_cost = "paper";
   config->tsdf.truncation.behind_power = 0;
   config->window.clock = "paper";
+  config->contour.surface_within = 1.0;
 }
 
 nlohmann::json to_json(const ErrorStatistics& e, double length_m) {
