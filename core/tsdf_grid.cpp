@@ -171,6 +171,7 @@ TsdfGrid::TsdfGrid(const TsdfConfig& config, double half_size_m, bool vectors) :
   rules_.middle_clear_from_m = static_cast<float>(config.middle_clear_from_m);
   rules_.standing_clear_to_m = static_cast<float>(config.low_clear_range_m);
   rules_.front_clear_to_m = static_cast<float>(config.front_clear_range_m);
+  rules_.appear_to_m = static_cast<float>(config.appear_range_m);
   rules_.vectors = vectors;
   weighted_sum_.resize(count);
   weight_.resize(count);

@@ -20,6 +20,7 @@ struct TsdfConfig {
   double middle_clear_from_m = 0.6;
   double low_clear_range_m = 2.5;
   double front_clear_range_m = 4.0;
+  double appear_range_m = 1.2;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -40,6 +41,9 @@ struct TsdfConfig {
     v.number("front_clear_range_m", front_clear_range_m, 0, 20, "m",
              "Up to here a surface is also contradicted within the truncation before another one (a person who stood at "
              "a wall); 0 = never.");
+    v.number("appear_range_m", appear_range_m, 0, 20, "m",
+             "Up to here a surface in cells known to be free counts at once, as its going does: before it is too near "
+             "for the camera to see it; 0 = never.");
   }
   std::vector<std::string> validate() const { return {}; }
   /// The largest weight one observation adds to a cell, in integer units.

@@ -12,6 +12,8 @@ namespace {
 
 constexpr std::int8_t kSupport = 76;        ///< 0.6: cells below this have a surface near
 constexpr std::int8_t kFrontContrast = 76;  ///< by this much a cell must be freer than it was known to be
+/// A reading's own surface: not its hidden side, where a wall may end whose other face is seen from another room.
+constexpr float kOwnBehind = -0.2f, kOwnFront = 0.3f;
 
 std::int8_t value_of(std::int32_t weighted_sum, std::int32_t weight) {
   if (weight <= 0) return TsdfGrid::kUnknown;
@@ -62,6 +64,14 @@ inline bool contradicts(const TsdfRules& rules, const TsdfObservation& o, std::s
          TsdfGrid::kValueScale * part.f - static_cast<float>(held) > static_cast<float>(kFrontContrast);
 }
 
+/// Whether the observation shows a surface in a cell that was known to be free. Near the robot that must count at once:
+/// closer still, a depth camera sees nothing of it, and what the map did not take in by then would be driven into.
+inline bool appears(const TsdfRules& rules, float d, const Part& part, std::int8_t held) {
+  return part.near_surface && d <= rules.appear_to_m && part.f >= kOwnBehind && part.f <= kOwnFront &&
+         held != TsdfGrid::kUnknown &&
+         static_cast<float>(held) - TsdfGrid::kValueScale * part.f > static_cast<float>(kFrontContrast);
+}
+
 inline void add_to_cell(const TsdfRules& rules, const TsdfObservation& o, const std::int32_t* column,
                         const float* distance_m, int k, const TsdfCells& cells, TsdfChange* change,
                         std::uint64_t* contradicted) {
@@ -70,14 +80,15 @@ inline void add_to_cell(const TsdfRules& rules, const TsdfObservation& o, const 
   const float d = distance_m[k];
   const Part part = part_of(rules, o, u, d);
   const bool standing = 4 * static_cast<std::int64_t>(cells.standing_weight[k]) >= cells.weight[k];
-  if (contradicts(rules, o, u, d, part, cells.value[k], standing)) {
+  const std::int8_t held = cells.value[k];
+  if (contradicts(rules, o, u, d, part, held, standing) || appears(rules, d, part, held)) {
     if (++cells.contradictions[k] >= rules.contradictions_to_reset) {
       cells.weighted_sum[k] = cells.weight[k] = cells.standing_weight[k] = 0;
       cells.reset[k] = o.sequence;
       cells.contradictions[k] = 0;
       ++*contradicted;
     }
-  } else if (part.near_surface) {
+  } else if (part.near_surface || (part.carved && held >= kSupport)) {
     cells.contradictions[k] = 0;
   }
   if (part.near_surface || part.carved) {
@@ -211,7 +222,14 @@ KNAV_AVX2 int add_to_cells_avx2(const TsdfRules& rules, const TsdfObservation& o
         part.near_surface);
     const __m256i touched = _mm256_and_si256(seen, _mm256_or_si256(part.near_surface, part.carved));
     const __m256i concerned = _mm256_or_si256(touched, _mm256_and_si256(part.before_free, seen));
-    const __m256i doubtful = _mm256_and_si256(_mm256_andnot_si256(agrees, surface), concerned);
+    const __m256i gone = _mm256_and_si256(_mm256_andnot_si256(agrees, surface), concerned);
+    const __m256i freer = _mm256_castps_si256(
+        _mm256_cmp_ps(contrast, _mm256_set1_ps(-static_cast<float>(kFrontContrast)), _CMP_LT_OQ));
+    const __m256i near_enough =
+        _mm256_castps_si256(_mm256_cmp_ps(d, _mm256_set1_ps(rules.appear_to_m), _CMP_LE_OQ));
+    const __m256i come =
+        _mm256_and_si256(_mm256_and_si256(freer, near_enough), _mm256_and_si256(part.near_surface, seen));
+    const __m256i doubtful = _mm256_or_si256(gone, come);
     if (!_mm256_testz_si256(doubtful, doubtful) || bytes8(cells.contradictions + k) != 0) {
       for (int j = k; j < k + 8; ++j)
         add_to_cell(rules, o, column, distance_m, j, cells, change, contradicted);

@@ -26,6 +26,7 @@ struct TsdfRules {
   float middle_clear_from_m = 0.0f;  ///< nearer than this even a middle thing is out of view
   float standing_clear_to_m = 0.0f;  ///< beyond this a low thing is no longer seen
   float front_clear_to_m = 0.0f;     ///< see TsdfConfig::front_clear_range_m
+  float appear_to_m = 0.0f;          ///< see TsdfConfig::appear_range_m
   bool vectors = true;
 };
 

@@ -59,6 +59,7 @@ void make_paper(LocalMapperConfig* config) {
   config->tsdf.truncation.behind_power = 0;
   config->window.clock = "paper";
   config->contour.surface_within = 1.0;
+  config->tsdf.appear_range_m = 0.0;
 }
 
 nlohmann::json to_json(const ErrorStatistics& e, double length_m) {

@@ -187,7 +187,7 @@ TEST(TsdfGrid, ContradictedSurfaceIsGoneAtOnceAndAWallBesideItStays) {
 /// Ten columns' width of camera that sees a thing 0.9 m ahead, then only the wall at 3 m behind; the floor from 1.3 m on.
 class BlindZone : public ::testing::Test {
  protected:
-  void add(float z_m, HeightClass height, int frames) {
+  void add(float z_m, HeightClass height, int frames, double sensor_x_m = 0.025) {
     for (int k = 0; k < frames; ++k) {
       DepthProfile profile = profile_of(std::vector<float>(101, z_m), 100.0);
       profile.height_class.assign(101, height);
@@ -198,7 +198,7 @@ class BlindZone : public ::testing::Test {
       TsdfObservation o;
       observation_from(profile, limits_of(config_), &o);
       o.sequence = ++sequence_;
-      o.T_map_sensor = {0.025, 0.025, 0.0};
+      o.T_map_sensor = {sensor_x_m, 0.025, 0.0};
       grid_.add(o);
       held_.push_back(o);
     }
@@ -223,6 +223,26 @@ TEST_F(BlindZone, APersonWhoLeftIsGoneAfterFourFrames) {
   EXPECT_FALSE(grid_.known(18, 0));
   EXPECT_EQ(grid_.weight_units(20, 0), 0);
   EXPECT_EQ(grid_.standing_weight_units(20, 0), 0);
+}
+
+TEST_F(BlindZone, WhoStepsCloseIsInTheMapBeforeTheCameraLosesHim) {
+  // Half a minute of free space, seen from 1.5 m back, holds 900 frames against the few in which somebody comes up.
+  for (const double appear_range_m : {TsdfConfig{}.appear_range_m, 0.0}) {
+    config_.appear_range_m = appear_range_m;
+    grid_ = TsdfGrid(config_, 6.0);
+    add(4.5f, HeightClass::kMiddle, 900, -1.475);
+    ASSERT_FLOAT_EQ(grid_.distance(20, 0), 1.0f);
+    add(0.9f, HeightClass::kMiddle, 3);
+    EXPECT_GT(grid_.distance(18, 0), 0.9f);  // three frames may be a glitch
+    add(0.9f, HeightClass::kMiddle, 3);
+    add(std::numeric_limits<float>::quiet_NaN(), HeightClass::kNone, 300);  // nearer than 0.5 m: no readings
+    if (appear_range_m > 0.0) {
+      EXPECT_NEAR(grid_.distance(17, 0), 0.05 / 0.3, 1e-3);  // cell 17 is 0.85 m ahead of the sensor
+      EXPECT_NEAR(grid_.distance(19, 0), -0.05 / 0.3, 1e-3);
+    } else {
+      EXPECT_GT(grid_.distance(19, 0), 0.9f);
+    }
+  }
 }
 
 TEST_F(BlindZone, ALowOrAHighThingStays) {
