@@ -78,7 +78,6 @@ TEST(KinectModel, NoiseHasTheRealWallsDeviationAndCorrelation) {
   KinectConfig config = KinectConfig::preset("default");
   config.dropout_signal = 0.0;
   config.shadow = false;
-  config.band_codes = 0.0;
   config.offset_at_10m = 0.0;
   KinectModel kinect(config, kCamera, 3, 7);
   for (const double z_m : {0.9, 1.3, 1.8}) {
