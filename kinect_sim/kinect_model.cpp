@@ -3,61 +3,53 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/multiversion.h"
 #include "core/pose2.h"
 #include "core/random.h"
 
 namespace knav {
 namespace {
 
-// The noise field: a torus that each frame reads from another place. White noise under a box of 8 x 8 px, as
-// the device matches blocks. After quantisation and with the bands that gives what the real walls in realdata
-// show, along rows and along columns, at any size of patch: the correlation falls straight to a kink at 8 px.
-// What is left beyond it along columns (0.11 on patches of 64 px) are the bands.
-constexpr int kFieldWidth = 1024, kFieldHeight = 512;
-constexpr int kBoxWidth = 8, kBoxHeight = 8;
-constexpr double kFieldUnit = 1.0 / 4096.0;  ///< codes per count
-
 constexpr float kBandCentre_px = 320.5f;
-constexpr float kFarthest_m = 40.0f;    ///< nothing comes back from beyond
+constexpr float kPhaseAboveZero = 64.0f;  ///< bands; keeps what is rounded by truncation positive
+constexpr float kFarthest_m = 40.0f;      ///< nothing comes back from beyond
 constexpr float kShadow_codes = 12.0f;  ///< a pixel whose projector column is this much nearer lies in shadow
 
-/// Sums over a running window on a ring.
-void box_filter(std::vector<float>& line, std::vector<float>& scratch, int window) {
-  const auto n = static_cast<int>(line.size());
-  scratch = line;
-  double sum = 0.0;
-  for (int i = 0; i < window; ++i) sum += scratch[static_cast<std::size_t>(i)];
-  for (int i = 0; i < n; ++i) {
-    line[static_cast<std::size_t>(i)] = static_cast<float>(sum);
-    sum += scratch[static_cast<std::size_t>((i + window) % n)] - scratch[static_cast<std::size_t>(i)];
+/// What a row's pixels are read with.
+struct RowKernel {
+  const float *z_m, *signal, *codes, *offset, *band_position;
+  const std::int16_t* grain;
+  float bands_far, bands_per_code, band_step;
+  float code_metres, farthest_codes, min_range_m, threshold;
+  int width_px;
+};
+
+/// The disparities that the matcher sees, and the whole codes that the device takes off afterwards.
+KNAV_MULTIVERSION
+void add_device_error(const RowKernel& kernel, float* seen_codes, std::int32_t* bands) {
+  const RowKernel k = kernel;
+  for (int u = 0; u < k.width_px; ++u) {
+    const float phase = k.band_position[u] * (k.bands_far - k.bands_per_code * k.codes[u]) + kPhaseAboveZero;
+    const auto band = static_cast<float>(static_cast<std::int32_t>(phase));
+    seen_codes[u] = k.codes[u] - k.offset[u] - k.band_step * (0.5f - (phase - band));
+    bands[u] = static_cast<std::int32_t>(k.band_step * band + 0.5f);
   }
 }
 
-std::vector<std::int16_t> make_field(std::uint64_t seed, int box_width, int box_height, double sd) {
-  std::vector<float> field(static_cast<std::size_t>(kFieldWidth) * kFieldHeight), line, scratch;
-  for (int y = 0; y < kFieldHeight; ++y) {
-    RandomStream random(seed, random_stream::kSimDepth, 0, static_cast<std::uint32_t>(y));
-    line.resize(kFieldWidth);
-    for (float& value : line) value = static_cast<float>(random.normal());
-    box_filter(line, scratch, box_width);
-    std::copy(line.begin(), line.end(), field.begin() + static_cast<std::ptrdiff_t>(y) * kFieldWidth);
+/// Depth [mm] of what a code stands for; 0 where nothing answers.
+KNAV_MULTIVERSION
+void read_depth(const RowKernel& kernel, const float* read_codes, std::int32_t* reading_mm) {
+  const RowKernel k = kernel;
+  for (int u = 0; u < k.width_px; ++u) {
+    const float code = read_codes[u] > k.farthest_codes ? read_codes[u] : k.farthest_codes;
+    const float mm = 1000.0f * k.code_metres / code;
+    const float z_m = k.z_m[u];
+    const float fall = 1.0f + z_m * z_m * 0.01f;
+    const float grain = 1.0f + 0.2f * NoiseField::kUnit * static_cast<float>(k.grain[u]);
+    const bool valid =
+        (z_m >= k.min_range_m) & (z_m < kFarthest_m) & (k.signal[u] * grain > k.threshold * fall);
+    reading_mm[u] = static_cast<std::int32_t>(valid) * static_cast<std::int32_t>(mm + 0.5f);
   }
-  line.resize(kFieldHeight);
-  for (int x = 0; x < kFieldWidth; ++x) {
-    for (int y = 0; y < kFieldHeight; ++y)
-      line[static_cast<std::size_t>(y)] =
-          field[static_cast<std::size_t>(y) * kFieldWidth + static_cast<std::size_t>(x)];
-    box_filter(line, scratch, box_height);
-    for (int y = 0; y < kFieldHeight; ++y)
-      field[static_cast<std::size_t>(y) * kFieldWidth + static_cast<std::size_t>(x)] =
-          line[static_cast<std::size_t>(y)];
-  }
-  const double scale = sd / std::sqrt(static_cast<double>(box_width) * box_height) / kFieldUnit;
-  std::vector<std::int16_t> result(field.size());
-  for (std::size_t i = 0; i < field.size(); ++i) {
-    result[i] = static_cast<std::int16_t>(std::lrint(std::clamp(field[i] * scale, -32000.0, 32000.0)));
-  }
-  return result;
 }
 
 }  // namespace
@@ -87,27 +79,28 @@ KinectConfig KinectConfig::preset(const std::string& name) {
 KinectModel::KinectModel(const KinectConfig& config, const PinholeModel& camera, std::uint64_t seed,
                          std::uint64_t device_seed)
     : config_(config), camera_(camera), seed_(seed), device_seed_(device_seed) {
+  if (config.quantize) {
+    // Rounding to whole codes adds a twelfth to the variance.
+    const double sd = std::sqrt(std::max(0.0, config.noise_codes * config.noise_codes - 1.0 / 12.0));
+    matcher_.emplace(seed, camera.width_px, sd, config.slope_noise_px);
+  }
   const auto width = static_cast<std::size_t>(camera.width_px);
   // Vertical bands, as the twelve walls in realdata show them: the reading jumps by one code at regular
   // columns, counted from the middle, and creeps back in between. Six jumps across the image at 0.56 m,
   // twelve at 1.4 m on one device, 11 to 14 on the other: their number falls with inverse depth.
   RandomStream bands(device_seed, random_stream::kSimBands, 0, 0);
-  bands_far_ = static_cast<float>(bands.uniform(14.0, 17.0));
-  bands_per_inverse_m_ = static_cast<float>(bands.uniform(4.3, 4.9));
+  bands_far_ = static_cast<float>(config.bands * bands.uniform(0.9, 1.1));
+  bands_per_inverse_m_ = static_cast<float>(config.bands * bands.uniform(0.28, 0.315));
   for (int u = 0; u < camera.width_px; ++u) {
     band_position_.push_back((static_cast<float>(u) - kBandCentre_px) / static_cast<float>(camera.width_px));
   }
-  codes_.assign(width, 0.0f);
-  reading_.assign(width, 0);
+  codes_.assign(width + 1, 0.0f);
+  seen_codes_.assign(width, 0.0f);
+  read_codes_.assign(width, 0.0f);
+  bands_.assign(width, 0);
+  reading_mm_.assign(width, 0);
   lit_codes_.assign(2 * width, 0.0f);
   make_offset(device_seed);
-  // Rounding to whole codes adds a twelfth to the variance of what was correlated before.
-  const double sd = config.quantize
-                        ? std::sqrt(std::max(0.0, config.noise_codes * config.noise_codes - 1.0 / 12.0))
-                        : config.noise_codes;
-  if (!config.quantize) return;
-  noise_ = make_field(seed, kBoxWidth, kBoxHeight, 1.0);
-  noise_sd_ = static_cast<float>(sd);
 }
 
 void KinectModel::make_offset(std::uint64_t device_seed) {
@@ -136,10 +129,9 @@ void KinectModel::make_offset(std::uint64_t device_seed) {
 
 void KinectModel::start_frame(std::uint64_t frame_index) {
   RandomStream random(seed_, random_stream::kSimDepth, frame_index, 0x40000000u);
-  noise_column_ = random.bits();
-  noise_row_ = random.bits();
-  texture_column_ = random.bits();
-  texture_row_ = random.bits();
+  if (!matcher_) return;
+  matcher_->start_frame(&random);
+  grain_place_ = NoiseField::any_place(camera_.width_px, &random);
 }
 
 void KinectModel::mark_lit(const float* codes) {
@@ -171,43 +163,33 @@ void KinectModel::sense_row(int row, const TrueRow& in, std::uint16_t* depth_mm)
     }
     return;
   }
-  float* codes = codes_.data();
+  float* codes = codes_.data() + 1;
   for (int u = 0; u < width; ++u) codes[u] = fb_codes / z_m[u];  // 0 at infinity
+  codes[-1] = codes[0];
   if (config_.shadow) mark_lit(codes);
 
-  const auto field = [&](std::uint32_t column, std::uint32_t first_row) {
-    const std::uint32_t field_row = (first_row + static_cast<std::uint32_t>(row)) % kFieldHeight;
-    return &noise_[field_row * kFieldWidth + column % static_cast<std::uint32_t>(kFieldWidth - width)];
-  };
-  const std::int16_t* noise = field(noise_column_, noise_row_);
-  const std::int16_t* texture = field(texture_column_, texture_row_);
-  const float* offset = offset_codes_.ptr<float>(row);
-  const float* position = band_position_.data();
-  const auto step = static_cast<float>(config_.band_codes);
-  const float bands_per_code = bands_per_inverse_m_ / fb_codes;
-  const float* signal = in.signal;
-  const auto unit = static_cast<float>(kFieldUnit);
-  const float noise_unit = noise_sd_ * unit;
-  const auto saturation_codes = static_cast<float>(fb_codes / config_.saturation_m);
-  const auto farthest_codes = static_cast<float>(fb_codes / config_.max_range_m);
+  RowKernel kernel = {};
+  kernel.z_m = z_m;
+  kernel.signal = in.signal;
+  kernel.codes = codes;
+  kernel.offset = offset_codes_.ptr<float>(row);
+  kernel.band_position = band_position_.data();
+  kernel.grain = matcher_->block_noise().row(grain_place_, row);
+  kernel.bands_far = bands_far_;
+  kernel.bands_per_code = bands_per_inverse_m_ / fb_codes;
+  kernel.band_step = static_cast<float>(config_.band_codes);
+  kernel.code_metres = fb_codes;
+  kernel.farthest_codes = static_cast<float>(fb_codes / config_.max_range_m);
+  kernel.min_range_m = min_range;
   // Without dropouts any signal is enough.
-  const auto threshold = static_cast<float>(config_.dropout_signal > 0.0 ? config_.dropout_signal : -1.0);
-  std::int32_t* reading = reading_.data();
-  for (int u = 0; u < width; ++u) {
-    // Codes below the one of infinity. The noise grows where they saturate: anything may come there.
-    const float far = std::max(0.0f, saturation_codes - codes[u]);
-    const float phase = position[u] * (bands_far_ - bands_per_code * codes[u]) + 64.0f;
-    const float band = step * (0.5f - (phase - static_cast<float>(static_cast<std::int32_t>(phase))));
-    float code =
-        codes[u] - offset[u] - band + (1.0f + 2.0f * far) * noise_unit * static_cast<float>(noise[u]);
-    code = std::max(static_cast<float>(static_cast<std::int32_t>(code + 0.5f)), farthest_codes);
-    const float mm = 1000.0f * fb_codes / code;
-    const float fall = 1.0f + z_m[u] * z_m[u] * 0.01f;
-    const float grain = 1.0f + 0.2f * unit * static_cast<float>(texture[u]);
-    const bool valid =
-        (z_m[u] >= min_range) & (z_m[u] < kFarthest_m) & (signal[u] * grain > threshold * fall);
-    reading[u] = valid ? static_cast<std::int32_t>(mm + 0.5f) : 0;
-  }
+  kernel.threshold = static_cast<float>(config_.dropout_signal > 0.0 ? config_.dropout_signal : -1.0);
+  kernel.width_px = width;
+  add_device_error(kernel, seen_codes_.data(), bands_.data());
+  // Codes count down to those of infinity. The noise grows where they saturate: anything may come there.
+  const auto saturation_codes = static_cast<float>(fb_codes / config_.saturation_m);
+  matcher_->match(row, {codes, seen_codes_.data(), bands_.data(), saturation_codes}, read_codes_.data());
+  std::int32_t* reading = reading_mm_.data();
+  read_depth(kernel, read_codes_.data(), reading);
   if (config_.shadow) {
     for (int u = 0; u < width; ++u) {
       const float position = static_cast<float>(u) - codes[u] * 0.125f + static_cast<float>(width) + 0.5f;

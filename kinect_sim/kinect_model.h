@@ -2,10 +2,13 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/camera_model.h"
+#include "kinect_sim/block_matcher.h"
+#include "kinect_sim/noise_field.h"
 
 namespace knav {
 
@@ -17,10 +20,12 @@ struct KinectConfig {
   double saturation_m = 20.0;  ///< beyond this anything may come
   double max_range_m = 26.0;   ///< largest value given out
   bool quantize = true;
-  double noise_codes = 0.52;  ///< sd of the quantised readings; 0 = none
+  double noise_codes = 0.48;     ///< sd of the quantised readings of a surface seen square; 0 = none
+  double slope_noise_px = 0.42;  ///< a slanted surface's noise: what it falls by in so many px, sd
   double offset_at_10m =
       0.10;                 ///< largest relative error at 10 m of the device's ring-shaped disparity offset
   double band_codes = 1.0;  ///< step between two vertical bands
+  double bands = 15.5;      ///< steps across the image far off; of a device, within a tenth of this
   bool shadow = true;       ///< pixels the projector does not light
   double dropout_signal = 0.02;  ///< signal below which a pixel gives nothing; 0 = never
 
@@ -36,7 +41,8 @@ struct TrueRow {
   float* signal = nullptr;  ///< albedo x cosine of incidence, before the fall with range
 };
 
-/// Turns true depth rows into what the sensor says. Deterministic by (seed, frame, row).
+/// Turns true depth rows into what the sensor says. Deterministic by (seed, frame, row). Rows are to come in
+/// rising order: what a block matcher makes of a slope takes the row above.
 class KinectModel {
  public:
   KinectModel(const KinectConfig& config, const PinholeModel& camera, std::uint64_t seed,
@@ -58,13 +64,14 @@ class KinectModel {
   PinholeModel camera_;
   std::uint64_t seed_, device_seed_;
   cv::Mat offset_px_, offset_codes_;
-  std::vector<std::int16_t> noise_;  ///< sd 1
-  float noise_sd_ = 0.0f;
-  std::vector<float> band_position_, codes_;
+  std::optional<BlockMatcher> matcher_;  ///< none of an ideal sensor
+  NoiseField::Place grain_place_;        ///< of how much surfaces send back
+  std::vector<float> band_position_;
   float bands_far_ = 0.0f, bands_per_inverse_m_ = 0.0f;  ///< steps across the image
-  std::vector<std::int32_t> reading_;
+  std::vector<float> codes_;                             ///< true disparities, after one more of column 0
+  std::vector<float> seen_codes_, read_codes_;
+  std::vector<std::int32_t> bands_, reading_mm_;
   std::vector<float> lit_codes_;  ///< nearest disparity [codes] per projector column
-  std::uint32_t noise_column_ = 0, noise_row_ = 0, texture_column_ = 0, texture_row_ = 0;
 };
 
 }  // namespace knav

@@ -89,6 +89,7 @@ double correlation_at(const cv::Mat& residual, int across, int down, double sd) 
 struct WindowPlane {
   double depth_m = 0.0, incidence_deg = 0.0;  ///< in the window's middle
   double rms_codes = 0.0, fill = 0.0;
+  Eigen::Vector3d gradient_codes = Eigen::Vector3d::Zero();
 };
 bool fit_plane(const cv::Mat& codes, const cv::Rect& window, const PinholeModel& camera, double least_fill,
                WindowPlane* plane) {
@@ -101,6 +102,7 @@ bool fit_plane(const cv::Mat& codes, const cv::Rect& window, const PinholeModel&
   if (!fit_surface<3>(codes(window), least_fill, ray, &gradient, &residual, &plane->fill)) return false;
   const Eigen::Vector3d middle = ray(0.5 * window.width, 0.5 * window.height);
   const double cosine = std::abs(gradient.dot(middle)) / (gradient.norm() * middle.norm());
+  plane->gradient_codes = gradient;
   plane->rms_codes = rms(residual);
   plane->depth_m = 1.0 / (kInverseDepthPerCode * gradient.dot(middle));
   plane->incidence_deg = std::acos(std::min(1.0, cosine)) * 180.0 / kPi;
@@ -139,6 +141,7 @@ void SensorStatistics::add_patches(const cv::Mat& codes, const PinholeModel& cam
   Eigen::Matrix<double, 6, 1> surface;
   cv::Mat residual;
   double fill = 0.0;
+  flat_pieces_.clear();
   const int margin = walls_ ? 0 : patch_px_ / 2;  // of what has to be a plane around the patch
   for (int v = margin; v + patch_px_ + margin <= codes.rows; v += patch_px_) {
     for (int u = kBorder_px + margin; u + patch_px_ + margin <= codes.cols - kBorder_px; u += patch_px_) {
@@ -148,7 +151,8 @@ void SensorStatistics::add_patches(const cv::Mat& codes, const PinholeModel& cam
       if (sd > kFlat_codes || sd < 1e-3) continue;
       const int side = patch_px_ + 2 * margin;
       WindowPlane plane;
-      if (!fit_plane(codes, {u - margin, v - margin, side, side}, camera, 0.9, &plane)) continue;
+      const cv::Rect surroundings(u - margin, v - margin, side, side);
+      if (!fit_plane(codes, surroundings, camera, 0.9, &plane)) continue;
       if (!walls_ && plane.rms_codes > kPlane_codes) continue;
       Patch patch = {plane.incidence_deg, sd, {}, {}};
       for (std::size_t i = 0; i < kLags_px.size(); ++i) {
@@ -156,6 +160,7 @@ void SensorStatistics::add_patches(const cv::Mat& codes, const PinholeModel& cam
         patch.down_columns[i] = correlation_at(residual, 0, kLags_px[i], sd);
       }
       patches_.push_back(patch);
+      flat_pieces_.push_back({surroundings, plane.gradient_codes});
     }
   }
 }

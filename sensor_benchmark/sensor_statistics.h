@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <opencv2/core.hpp>
 #include <set>
@@ -29,6 +30,13 @@ class SensorStatistics {
   void add(const cv::Mat& depth_m, const PinholeModel& camera);
 
   int frames() const { return frames_; }
+  /// What a frame shows flat: a window in which codes = plane . ((u - cx) / fx, (v - cy) / fy, 1).
+  struct FlatPiece {
+    cv::Rect window;
+    Eigen::Vector3d plane;
+  };
+  /// The surroundings of the newest frame's patches.
+  const std::vector<FlatPiece>& flat_pieces() const { return flat_pieces_; }
   /// Of flat patches: medians of the residuals' sd and of their autocorrelation at kLags_px.
   struct Noise {
     int patches = 0;
@@ -61,6 +69,7 @@ class SensorStatistics {
     std::array<double, 3> along_rows, down_columns;
   };
   std::vector<Patch> patches_;
+  std::vector<FlatPiece> flat_pieces_;
   std::vector<double> band_steps_, levels_per_code_;
   double valid_sum_[kDepthBins][kIncidenceBins] = {}, valid_tiles_[kDepthBins][kIncidenceBins] = {};
 };
