@@ -1,0 +1,94 @@
+#include "kinect_calib/wall_view.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/pose2.h"
+
+namespace knav {
+namespace {
+
+// Of the image's width and height. Further out there is floor from 2 m on, and the sensor's error is largest.
+constexpr double kMiddle = 0.6;
+constexpr double kLeastOnWall = 0.5;
+// A leg at 3 m is 3 % of the middle; a wall's foot or a socket is less.
+constexpr double kMostOffWall = 0.02;
+constexpr double kMostTurned_deg = 20.0;
+constexpr double kMostPitched_deg = 5.0;  // the fit takes 7 degrees to any side
+// Farther off floor hides the wall's lower half, and what is left of the device's ring looks like pitch.
+constexpr double kPitchTold_m = 1.2;
+
+}  // namespace
+
+WallViewer::WallViewer(const PinholeModel& camera) : tiles_(camera) {
+  const TileGrid& grid = tiles_.gate_grid();
+  for (int r = 0; r < grid.rows; ++r) {
+    for (int c = 0; c < grid.columns; ++c) {
+      const bool middle = std::abs((c + 0.5) / grid.columns - 0.5) < 0.5 * kMiddle &&
+                          std::abs((r + 0.5) / grid.rows - 0.5) < 0.5 * kMiddle;
+      in_middle_.push_back(middle ? 1 : 0);
+      middle_count_ += middle ? 1 : 0;
+    }
+  }
+}
+
+const WallView& WallViewer::look(const cv::Mat& depth_m) {
+  view_ = WallView{};
+  const TileGrid& grid = tiles_.gate_grid();
+  const std::vector<double>& per_m = tiles_.average_gate_tiles(depth_m);
+  middle_per_m_.assign(per_m.size(), std::numeric_limits<double>::quiet_NaN());
+  values_.clear();
+  for (std::size_t tile = 0; tile < per_m.size(); ++tile) {
+    if (in_middle_[tile] == 0 || std::isnan(per_m[tile])) continue;
+    middle_per_m_[tile] = per_m[tile];
+    values_.push_back(per_m[tile]);
+  }
+  const int answered = static_cast<int>(values_.size());
+  const int enough = static_cast<int>(kLeastOnWall * middle_count_);
+  if (answered < enough) {
+    view_.fault = fmt::format(
+        "only {:.0f} % of the image's middle has depth; the Kinect sees nothing nearer than 0.5 m: is the "
+        "wall "
+        "there, light and matt?",
+        100.0 * answered / middle_count_);
+    return view_;
+  }
+  view_.plane = WallPlane{median_of(&values_)};
+  const int kept = fit_wall_plane(grid, middle_per_m_, enough, &view_.plane);
+  view_.on_wall = static_cast<double>(kept) / middle_count_;
+  int off = 0, on = 0;
+  double squares = 0.0;
+  for (std::size_t tile = 0; tile < middle_per_m_.size(); ++tile) {
+    if (std::isnan(middle_per_m_[tile])) continue;
+    const double expected = view_.plane.at(grid.x[tile], grid.y[tile]);
+    const double deviation = middle_per_m_[tile] - expected;
+    if (std::abs(deviation) > wall_tolerance_per_m(kWallShare, expected)) {
+      ++off;
+    } else {
+      ++on;
+      squares += deviation * deviation;
+    }
+  }
+  view_.off_wall = static_cast<double>(off) / answered;
+  view_.deviation_codes = on > 0 ? std::sqrt(squares / on) / kInverseDepthPerCode : 0.0;
+  const double yaw_deg = view_.plane.yaw_rad() * 180.0 / kPi,
+               pitch_deg = view_.plane.pitch_rad() * 180.0 / kPi;
+  if (kept < enough || view_.off_wall > kMostOffWall) {
+    view_.fault = fmt::format(
+        "the image's middle is no plane ({:.0f} % of it lies off the wall): has somebody walked in, or does "
+        "the "
+        "wall not fill the view?",
+        100.0 * (kept < enough ? 1.0 - view_.on_wall : view_.off_wall));
+  } else if (std::abs(yaw_deg) > kMostTurned_deg) {
+    view_.fault = fmt::format("the wall stands {:.0f} degrees off square; turn the robot to within {:.0f}.",
+                              std::abs(yaw_deg), kMostTurned_deg);
+  } else if (std::abs(pitch_deg) > kMostPitched_deg && view_.plane.distance_m() < kPitchTold_m) {
+    view_.fault = fmt::format("the camera looks {:.1f} degrees {}; level it to within {:.0f}.",
+                              std::abs(pitch_deg), pitch_deg > 0.0 ? "up" : "down", kMostPitched_deg);
+  }
+  return view_;
+}
+
+}  // namespace knav
