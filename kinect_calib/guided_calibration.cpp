@@ -10,6 +10,7 @@ namespace knav {
 namespace {
 
 constexpr int kMostRefusals = 3;
+constexpr double kClockJump_s = 0.5;
 
 }  // namespace
 
@@ -131,11 +132,13 @@ bool GuidedCalibration::stopped_by_trouble(const GuidedInput& input) {
 
 GuidedStep GuidedCalibration::step(const GuidedInput& input) {
   GuidedStep step;
+  const auto ended = [&] { return state_ == GuidedState::kDone || state_ == GuidedState::kFailed; };
+  if (input.now_s < now_s_ - kClockJump_s && !ended())
+    fail(fmt::format("the clock jumped back by {:.1f} s.", now_s_ - input.now_s));
   now_s_ = input.now_s;
   if (!input.ranges_m.empty()) newest_range_s_ = input.now_s;
-  const bool ended = state_ == GuidedState::kDone || state_ == GuidedState::kFailed;
   // While it asks it stands, however long that takes.
-  if (!ended && (state_ == GuidedState::kAsk || !stopped_by_trouble(input))) {
+  if (!ended() && (state_ == GuidedState::kAsk || !stopped_by_trouble(input))) {
     switch (state_) {
       case GuidedState::kSquareUp:
         square_up(input, &step);

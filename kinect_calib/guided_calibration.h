@@ -8,7 +8,7 @@
 #include "core/pose2.h"
 #include "kinect_calib/guided_calibration_config.h"
 #include "kinect_calib/standing_range.h"
-#include "kinect_calib/wall_view.h"
+#include "kinect_calib/wall_viewer.h"
 
 namespace knav {
 
@@ -26,7 +26,7 @@ struct GuidedInput {
   double now_s = 0.0;
   bool new_frame = false;
   double depth_stamp_s = -std::numeric_limits<double>::infinity();
-  WallView wall;  ///< of the newest frame
+  SeenWall wall;  ///< of the newest frame
   double odometry_stamp_s = -std::numeric_limits<double>::infinity();
   Pose2 T_odom_base;
   std::vector<double> ranges_m;

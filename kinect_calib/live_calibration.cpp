@@ -31,7 +31,7 @@ void spin_for(double seconds) {
 }
 
 std::string measured_line(const GuidedInput& input) {
-  const WallView& wall = input.wall;
+  const SeenWall& wall = input.wall;
   if (!wall.fault.empty() || wall.plane.per_m <= 0.0) return wall.fault;
   const double degree = kPi / 180.0;
   return fmt::format(
@@ -117,12 +117,14 @@ std::optional<double> LiveCalibration::typed() {
 
 void LiveCalibration::announce(const GuidedStep& step) {
   if (step.state == GuidedState::kPaused) status_.print("Standing: " + step.text);
-  if (step.state == GuidedState::kAsk) status_.print(step.text + ":");
+  if (step.state == GuidedState::kAsk && !status_.on_terminal()) status_.print(step.text + ":");
 }
 
 std::string LiveCalibration::line_of(const GuidedStep& step) const {
-  return fmt::format("distance {} of {}: {}", std::min(guide_.finished_count() + 1, guide_.total_count()),
-                     guide_.total_count(), step.text);
+  // The question ends where the answer is typed.
+  const char* const end = step.state == GuidedState::kAsk ? ": " : "";
+  return fmt::format("distance {} of {}: {}{}", std::min(guide_.finished_count() + 1, guide_.total_count()),
+                     guide_.total_count(), step.text, end);
 }
 
 /// The fit's own test of each frame comes first, so that it will not refuse the folder later.

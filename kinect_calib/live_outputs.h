@@ -41,6 +41,7 @@ class Commander {
 class StatusLine {
  public:
   StatusLine() : publisher_(ros::NodeHandle().advertise<std_msgs::String>("calibration_status", 1, true)) {}
+  bool on_terminal() const { return terminal_; }
   void show(const std::string& text) {
     const ros::WallTime now = ros::WallTime::now();
     if (text == text_ || (now - shown_).toSec() < 0.2) return;

@@ -38,7 +38,9 @@ LiveWall::LiveWall(const LiveTopics& topics, bool range_finder)
 }
 
 void LiveWall::on_range(const sensor_msgs::Range& message) {
-  const bool within = message.range >= message.min_range && message.range <= message.max_range;
+  // Some drivers leave the limits at 0.
+  const bool limits = message.max_range > message.min_range;
+  const bool within = !limits || (message.range >= message.min_range && message.range <= message.max_range);
   input_.ranges_m.push_back(within ? static_cast<double>(message.range) : std::nan(""));
 }
 

@@ -13,7 +13,7 @@
 #include "kinect_calib/depth_corrector.h"
 #include "kinect_calib/guided_calibration.h"
 #include "kinect_calib/wall_loader.h"
-#include "kinect_calib/wall_view.h"
+#include "kinect_calib/wall_viewer.h"
 
 namespace knav {
 

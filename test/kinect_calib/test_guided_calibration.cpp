@@ -158,6 +158,16 @@ TEST(GuidedCalibration, GivesUpWhenTheTroubleLasts) {
   EXPECT_THAT(run.step.text, HasSubstr("no depth image"));
 }
 
+TEST(GuidedCalibration, StopsWhenTheClockJumpsBack) {
+  WallRobot robot;
+  GuidedRun run({}, all_clear(), &robot);
+  run.run([&] { return run.finished.size() == 1; });
+  robot.now_s -= 20.0;
+  run.run();
+  EXPECT_EQ(run.step.state, GuidedState::kFailed);
+  EXPECT_THAT(run.step.text, HasSubstr("clock"));
+}
+
 TEST(GuidedCalibration, StopsWhenTheWheelsTurnAndTheWallStays) {
   WallRobot robot;
   GuidedRun run({}, all_clear(), &robot);

@@ -66,12 +66,12 @@ struct WallRobot {
  private:
   struct Frame {
     double stamp_s;
-    WallView view;
+    SeenWall view;
   };
 
   /// Off by 1 % at 1 m, growing, as a device's error does.
-  WallView view() {
-    WallView view;
+  SeenWall view() {
+    SeenWall view;
     const double tilt = std::tan(yaw_rad + random_.normal(0.0, 0.0005));
     const double per_m = std::cos(yaw_rad) / distance_m - 0.003;
     view.plane = {per_m, per_m * tilt, 0.0};

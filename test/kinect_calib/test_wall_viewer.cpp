@@ -8,7 +8,7 @@
 #include "core/random.h"
 #include "kinect_calib/calibration_view.h"
 #include "kinect_calib/terminal_prompt.h"
-#include "kinect_calib/wall_view.h"
+#include "kinect_calib/wall_viewer.h"
 
 namespace knav {
 namespace {
@@ -37,11 +37,14 @@ cv::Mat wall(double distance_m, double yaw_deg, double pitch_deg = 0.0) {
   return depth;
 }
 
-void add_floor(double camera_height_m, cv::Mat* depth) {
+/// @param seen_to_m farther off it gives nothing
+void add_floor(double camera_height_m, double seen_to_m, cv::Mat* depth) {
   for (int v = 241; v < 480; ++v) {
     const double floor_m = camera_height_m * 585.0 / (v - 239.5);
     for (int u = 0; u < 640; ++u) {
-      if (floor_m < depth->at<float>(v, u)) depth->at<float>(v, u) = static_cast<float>(floor_m);
+      if (floor_m > depth->at<float>(v, u)) continue;
+      depth->at<float>(v, u) =
+          floor_m < seen_to_m ? static_cast<float>(floor_m) : std::numeric_limits<float>::quiet_NaN();
     }
   }
 }
@@ -51,8 +54,8 @@ TEST(WallViewer, TellsDistanceAndAngles) {
   for (const double distance_m : {0.55, 1.0, 2.0, 4.0}) {
     for (const double yaw_deg : {-18.0, -8.0, 0.0, 0.5, 8.0, 18.0}) {
       cv::Mat depth = wall(distance_m, yaw_deg, 2.0);
-      add_floor(0.5, &depth);
-      const WallView& view = viewer.look(depth);
+      add_floor(0.5, 10.0, &depth);
+      const SeenWall& view = viewer.look(depth);
       EXPECT_EQ(view.fault, "") << distance_m << " m, " << yaw_deg << " deg";
       // The ring is symmetric about the middle, so it bends no angle; of the distance it takes its share.
       EXPECT_NEAR(view.plane.yaw_rad() / kDegree, yaw_deg, 0.1 + 0.02 * std::abs(yaw_deg)) << distance_m;
@@ -64,11 +67,20 @@ TEST(WallViewer, TellsDistanceAndAngles) {
   }
 }
 
+TEST(WallViewer, FloorThatDropsOutBeforeTheWallIsNoPerson) {
+  WallViewer viewer(kCamera);
+  for (double seen_to_m = 2.0; seen_to_m < 4.0; seen_to_m += 0.1) {
+    cv::Mat depth = wall(3.95, 0.0);
+    add_floor(0.5, seen_to_m, &depth);
+    EXPECT_EQ(viewer.look(depth).fault, "") << seen_to_m;
+  }
+}
+
 TEST(WallViewer, SomebodyBeforeTheWallMakesItNoPlane) {
   WallViewer viewer(kCamera);
   for (const double distance_m : {1.0, 2.5, 4.0}) {
     cv::Mat depth = wall(distance_m, 0.0);
-    add_floor(0.5, &depth);
+    add_floor(0.5, 10.0, &depth);
     depth(cv::Rect(400, 100, 60, 300)).setTo(static_cast<float>(0.75 * distance_m));
     EXPECT_THAT(viewer.look(depth).fault, HasSubstr("no plane")) << distance_m;
   }

@@ -1,7 +1,8 @@
-#include "kinect_calib/wall_view.h"
+#include "kinect_calib/wall_viewer.h"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -34,8 +35,29 @@ WallViewer::WallViewer(const PinholeModel& camera) : tiles_(camera) {
   }
 }
 
-const WallView& WallViewer::look(const cv::Mat& depth_m) {
-  view_ = WallView{};
+bool WallViewer::is_on_wall(std::size_t tile) const {
+  const double expected = view_.plane.at(tiles_.gate_grid().x[tile], tiles_.gate_grid().y[tile]);
+  return std::abs(middle_per_m_[tile] - expected) <= wall_tolerance_per_m(kWallShare, expected);
+}
+
+/// The floor before the wall fills rows from below. Where it drops out in a tile's upper half it does not
+/// show by its slope.
+int WallViewer::first_floor_row() const {
+  const TileGrid& grid = tiles_.gate_grid();
+  for (int r = grid.rows - 1; r > grid.rows / 2; --r) {
+    int middle = 0, on = 0;
+    for (int c = 0; c < grid.columns; ++c) {
+      const std::size_t tile = grid.index(r, c);
+      middle += in_middle_[tile] != 0 ? 1 : 0;
+      on += in_middle_[tile] != 0 && is_on_wall(tile) ? 1 : 0;
+    }
+    if (middle > 0 && 2 * on >= middle) return r + 1;
+  }
+  return grid.rows / 2 + 1;
+}
+
+const SeenWall& WallViewer::look(const cv::Mat& depth_m) {
+  view_ = SeenWall{};
   const TileGrid& grid = tiles_.gate_grid();
   const std::vector<double>& per_m = tiles_.average_gate_tiles(depth_m);
   middle_per_m_.assign(per_m.size(), std::numeric_limits<double>::quiet_NaN());
@@ -50,36 +72,34 @@ const WallView& WallViewer::look(const cv::Mat& depth_m) {
   if (answered < enough) {
     view_.fault = fmt::format(
         "only {:.0f} % of the image's middle has depth; the Kinect sees nothing nearer than 0.5 m: is the "
-        "wall "
-        "there, light and matt?",
+        "wall there, light and matt?",
         100.0 * answered / middle_count_);
     return view_;
   }
   view_.plane = WallPlane{median_of(&values_)};
   const int kept = fit_wall_plane(grid, middle_per_m_, enough, &view_.plane);
   view_.on_wall = static_cast<double>(kept) / middle_count_;
+  const int floor_row = first_floor_row();
   int off = 0, on = 0;
   double squares = 0.0;
-  for (std::size_t tile = 0; tile < middle_per_m_.size(); ++tile) {
+  for (std::size_t tile = 0; tile < grid.index(floor_row, 0); ++tile) {
     if (std::isnan(middle_per_m_[tile])) continue;
-    const double expected = view_.plane.at(grid.x[tile], grid.y[tile]);
-    const double deviation = middle_per_m_[tile] - expected;
-    if (std::abs(deviation) > wall_tolerance_per_m(kWallShare, expected)) {
-      ++off;
-    } else {
+    if (is_on_wall(tile)) {
+      const double deviation = middle_per_m_[tile] - view_.plane.at(grid.x[tile], grid.y[tile]);
       ++on;
       squares += deviation * deviation;
+    } else {
+      ++off;
     }
   }
-  view_.off_wall = static_cast<double>(off) / answered;
+  view_.off_wall = static_cast<double>(off) / std::max(1, on + off);
   view_.deviation_codes = on > 0 ? std::sqrt(squares / on) / kInverseDepthPerCode : 0.0;
   const double yaw_deg = view_.plane.yaw_rad() * 180.0 / kPi,
                pitch_deg = view_.plane.pitch_rad() * 180.0 / kPi;
   if (kept < enough || view_.off_wall > kMostOffWall) {
     view_.fault = fmt::format(
         "the image's middle is no plane ({:.0f} % of it lies off the wall): has somebody walked in, or does "
-        "the "
-        "wall not fill the view?",
+        "the wall not fill the view?",
         100.0 * (kept < enough ? 1.0 - view_.on_wall : view_.off_wall));
   } else if (std::abs(yaw_deg) > kMostTurned_deg) {
     view_.fault = fmt::format("the wall stands {:.0f} degrees off square; turn the robot to within {:.0f}.",
