@@ -28,6 +28,8 @@ const char* name_of(GuidedState state) {
       return "collecting";
     case GuidedState::kAsk:
       return "asking";
+    case GuidedState::kSwing:
+      return "swinging";
     case GuidedState::kPaused:
       return "paused";
     case GuidedState::kDone:
@@ -90,7 +92,7 @@ std::string GuidedCalibration::trouble(const GuidedInput& input) const {
     return fmt::format("no odometry has come on '{}' yet.", start_.odometry_topic);
   if (odometry_age_s > config_.odometry_stale_s)
     return fmt::format("the newest odometry on '{}' is {:.1f} s old.", start_.odometry_topic, odometry_age_s);
-  if (!input.wall.fault.empty()) return input.wall.fault;
+  if (!input.wall.fault.empty() && state_ != GuidedState::kSwing) return input.wall.fault;
   const double range_age_s = input.now_s - newest_range_s_;
   if (start_.range_finder && !std::isfinite(range_age_s)) {
     return fmt::format("no reading of the range finder has come on '{}' yet; without one, start with --ask.",
@@ -155,6 +157,9 @@ GuidedStep GuidedCalibration::step(const GuidedInput& input) {
       case GuidedState::kAsk:
         ask(input, &step);
         break;
+      case GuidedState::kSwing:
+        swing(input, &step);
+        break;
       default:
         break;
     }
@@ -176,11 +181,10 @@ void GuidedCalibration::accept() {
   anchor_depth_m_ = stood_depth_m_;
   T_odom_anchor_ = T_odom_stood_;
   target_m_ = config_.next_distance_m(last_finished_m_);
-  if (target_m_ > 0.0) {
-    start_moving();
-  } else {
-    enter(GuidedState::kDone);
-  }
+  if (target_m_ <= 0.0) return enter(GuidedState::kDone);
+  if (start_.range_finder && config_.swing_every > 0 && finished_ % config_.swing_every == 0)
+    return start_swing();
+  start_moving();
 }
 
 void GuidedCalibration::refuse(const std::string& why) {

@@ -7,6 +7,7 @@
 
 #include "core/pose2.h"
 #include "kinect_calib/guided_calibration_config.h"
+#include "kinect_calib/square_bias.h"
 #include "kinect_calib/standing_range.h"
 #include "kinect_calib/wall_viewer.h"
 
@@ -40,7 +41,7 @@ struct GuidedDistance {
   double depth_m = 0.0, off_square_deg = 0.0;
 };
 
-enum class GuidedState { kWait, kSquareUp, kSettle, kMove, kCollect, kAsk, kPaused, kDone, kFailed };
+enum class GuidedState { kWait, kSquareUp, kSettle, kMove, kCollect, kAsk, kSwing, kPaused, kDone, kFailed };
 
 /// What to do now.
 struct GuidedStep {
@@ -69,7 +70,7 @@ class GuidedCalibration {
   int finished_count() const { return finished_; }
   int total_count() const;
   double target_m() const { return target_m_; }
-  double off_square_deg() const { return off_square_deg_; }  ///< as measured standing
+  const SquareBias& square_bias() const { return square_bias_; }
 
  private:
   void enter(GuidedState state);
@@ -82,8 +83,13 @@ class GuidedCalibration {
   void move(const GuidedInput& input, GuidedStep* step);
   void collect(const GuidedInput& input, GuidedStep* step);
   void ask(const GuidedInput& input, GuidedStep* step);
+  enum class SwingPhase { kLeft, kRight, kBack };
+  void start_swing();
+  void swing_to(SwingPhase phase);
+  void swing(const GuidedInput& input, GuidedStep* step);
   void finish(double distance_m, int readings, GuidedStep* step);
   double turn_towards_square(double yaw_rad) const;
+  double off_square_rad(const GuidedInput& input) const;
   double here_m(const GuidedInput& input) const;
   bool has_moved(const GuidedInput& input, double patience) const;
 
@@ -118,6 +124,12 @@ class GuidedCalibration {
   StandingRange ranges_;
   double newest_range_s_ = -std::numeric_limits<double>::infinity();
   int frames_ = 0;
+
+  SquareBias square_bias_;
+  Swing swing_;
+  SwingPhase swing_phase_ = SwingPhase::kLeft;
+  bool swing_standing_ = false;
+  double swing_since_s_ = 0.0;
 
   double trouble_since_s_ = -1.0, calm_since_s_ = -1.0;
   bool drop_ = false;

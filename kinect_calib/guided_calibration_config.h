@@ -20,6 +20,8 @@ struct GuidedCalibrationConfig {
   double speed_mps = 0.1;
   double turn_max_radps = 0.25;
   double turn_min_radps = 0.05;
+  int swing_every = 1;
+  double swing_deg = 10.0;
   double settle_s = 0.8;
   double square_limit_s = 40.0;
   double depth_stale_s = 0.5;
@@ -43,6 +45,10 @@ struct GuidedCalibrationConfig {
     v.number("turn_max_radps", turn_max_radps, 0.05, 0.5, "rad/s", "The fastest it turns to get square.");
     v.number("turn_min_radps", turn_min_radps, 0.01, 0.3, "rad/s",
              "The slowest turn that the base still obeys.");
+    v.integer("swing_every", swing_every, 0, 100, "",
+              "At every so many distances it turns to both sides, to learn from the range finder what is "
+              "square; 0: never.");
+    v.number("swing_deg", swing_deg, 3, 15, "deg", "How far.");
     v.number("settle_s", settle_s, 0.1, 10, "s",
              "Standing still before the wall is judged; the last half of it counts.");
     v.number("square_limit_s", square_limit_s, 5, 600, "s", "To get square in.");

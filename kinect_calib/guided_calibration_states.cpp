@@ -33,7 +33,7 @@ double GuidedCalibration::turn_towards_square(double yaw_rad) const {
 
 void GuidedCalibration::square_up(const GuidedInput& input, GuidedStep* step) {
   if (input.new_frame) {
-    const double yaw_rad = input.wall.plane.yaw_rad();
+    const double yaw_rad = off_square_rad(input);
     if (square_from_rad_ < 0.0) square_from_rad_ = std::abs(yaw_rad);
     // Turning it stops early: frames come late, and the base takes time to stop.
     const bool there = std::abs(yaw_rad) < 0.5 * config_.square_within_deg * kRadPerDeg;
@@ -52,7 +52,7 @@ void GuidedCalibration::square_up(const GuidedInput& input, GuidedStep* step) {
     return fail(fmt::format(
         "the robot cannot get square: after {:.0f} s it is {:.1f} degrees off, and {} are allowed; "
         "does it obey cmd_vel, down to {} rad/s (turn_min_radps)?",
-        config_.square_limit_s, std::abs(input.wall.plane.yaw_rad()) / kRadPerDeg, config_.square_within_deg,
+        config_.square_limit_s, std::abs(off_square_rad(input)) / kRadPerDeg, config_.square_within_deg,
         config_.turn_min_radps));
   }
   step->turn_radps = turn_radps_;
@@ -62,7 +62,7 @@ void GuidedCalibration::settle(const GuidedInput& input) {
   const double stood_s = input.now_s - entered_s_;
   if (stood_s < 0.5 * config_.settle_s) return;
   if (input.new_frame && input.depth_stamp_s > entered_s_) {
-    sum_yaw_rad_ += input.wall.plane.yaw_rad();
+    sum_yaw_rad_ += off_square_rad(input);
     sum_depth_m_ += input.wall.plane.distance_m();
     ++stood_frames_;
   }
@@ -87,6 +87,11 @@ void GuidedCalibration::settle(const GuidedInput& input) {
         target_m_, here_m(input), kMostMoves));
   }
   start_moving();
+}
+
+double GuidedCalibration::off_square_rad(const GuidedInput& input) const {
+  const WallPlane& plane = input.wall.plane;
+  return plane.yaw_rad() - square_bias_.apparent_yaw_rad(plane.distance_m());
 }
 
 /// By odometry from where the distance was known.
@@ -131,7 +136,7 @@ void GuidedCalibration::move(const GuidedInput& input, GuidedStep* step) {
   // A target just passed is not turned back to: settle() judges where it stands.
   if (std::abs(left_m) < kArrived_m || direction_ == (forward ? -1 : 1)) return enter(GuidedState::kSquareUp);
   direction_ = forward ? 1 : -1;
-  const double yaw_rad = input.wall.plane.yaw_rad();
+  const double yaw_rad = off_square_rad(input);
   if (std::abs(yaw_rad) > kWrongWay_rad) return enter(GuidedState::kSquareUp);
   const double speed = std::min(config_.speed_mps, std::max(kSlowest_mps, 0.8 * std::abs(left_m)));
   step->forward_mps = forward ? speed : -speed;
@@ -147,7 +152,7 @@ void GuidedCalibration::collect(const GuidedInput& input, GuidedStep* step) {
   if (input.new_frame && frames_ < config_.frames && input.depth_stamp_s > entered_s_) {
     step->keep_frame = true;
     ++frames_;
-    sum_yaw_rad_ += input.wall.plane.yaw_rad();
+    sum_yaw_rad_ += off_square_rad(input);
     sum_depth_m_ += input.wall.plane.distance_m();
     ++stood_frames_;
   }

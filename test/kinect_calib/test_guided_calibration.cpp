@@ -59,7 +59,7 @@ TEST_P(FromEightDegreesOff, GetsSquareAndBacksOffToFourMetresInEvenSteps) {
   EXPECT_NEAR(run.true_m.back(), 4.0, 0.1);
   for (std::size_t i = 0; i < run.finished.size(); ++i) {
     EXPECT_EQ(run.kept_at[i], config.frames);
-    EXPECT_NEAR(run.finished[i].distance_m, run.true_m[i], 0.002);
+    EXPECT_NEAR(run.finished[i].distance_m, run.true_m[i], 0.004);  // the median of 8 of sd 2 mm
     EXPECT_LT(run.finished[i].sd_m, 0.005);
     EXPECT_LE(std::abs(run.true_off_square_rad[i]), (config.square_within_deg + 0.1) * kDegree)
         << run.true_m[i];
@@ -72,6 +72,47 @@ TEST_P(FromEightDegreesOff, GetsSquareAndBacksOffToFourMetresInEvenSteps) {
   EXPECT_TRUE(run.notices.empty()) << run.notices.front();
 }
 INSTANTIATE_TEST_SUITE_P(BothSides, FromEightDegreesOff, ::testing::Values(8.0, -8.0, 18.0));
+
+/// rms over ten runs, at the farthest distance.
+double off_square_deg(double slant_per_m, int swing_every) {
+  double squares = 0.0;
+  constexpr int kRuns = 10;
+  for (std::uint32_t seed = 0; seed < kRuns; ++seed) {
+    WallRobot robot(seed);
+    robot.slant_per_m = slant_per_m;
+    robot.finder_left_m = 0.03;
+    robot.finder_yaw_rad = 0.5 * kDegree;
+    GuidedCalibrationConfig config;
+    config.swing_every = swing_every;
+    GuidedRun run(config, all_clear(), &robot);
+    run.run();
+    EXPECT_EQ(run.step.state, GuidedState::kDone) << run.step.text;
+    squares += std::pow(run.true_off_square_rad.back() / kDegree, 2);
+  }
+  return std::sqrt(squares / kRuns);
+}
+
+TEST(GuidedCalibration, StandsSquareAlthoughTheDeviceIsSlanted) {
+  // At 4 m such a device shows a square wall turned by 0.7 degrees. The finder sits beside the axis, its beam
+  // askew.
+  for (const double slant_per_m : {0.003, -0.003}) {
+    EXPECT_GT(off_square_deg(slant_per_m, 0), 0.6);
+    EXPECT_LT(off_square_deg(slant_per_m, 1), 0.3);
+  }
+}
+
+TEST(GuidedCalibration, AWallThatEndsInViewToTheSidesIsTurnedBackFrom) {
+  WallRobot robot;
+  GuidedRun run({}, all_clear(), &robot);
+  run.run([&] { return run.step.state == GuidedState::kSwing && robot.yaw_rad > 5.0 * kDegree; });
+  ASSERT_EQ(run.step.state, GuidedState::kSwing);
+  robot.somebody_walks_in = true;
+  run.run([&] { return robot.yaw_rad < 2.5 * kDegree; });
+  EXPECT_EQ(run.step.state, GuidedState::kSwing);
+  robot.somebody_walks_in = false;
+  run.run();
+  EXPECT_EQ(run.step.state, GuidedState::kDone) << run.step.text;
+}
 
 TEST(GuidedCalibration, DrivesUpToTheFirstDistance) {
   WallRobot robot;

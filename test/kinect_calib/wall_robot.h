@@ -13,11 +13,15 @@ namespace knav {
 
 /// A robot before a wall whose normal is the x axis: it obeys cmd_vel with a lag, and its images come late.
 struct WallRobot {
+  explicit WallRobot(std::uint32_t seed = 0) : random_(1, random_stream::kTest, 8, seed) {}
+
   double distance_m = 0.6, yaw_rad = 0.0;  ///< of the camera, which sits on the base's axis
   double lag_s = 0.15, frame_delay_s = 0.08;
   double odometry_scale = 1.0, turn_sign = 1.0;
   bool blocked_behind = false, wheels_stall = false;  ///< the second: odometry notices
   double range_noise_m = 0.002, range_jump_m = 0.0;
+  double slant_per_m = 0.0;  ///< the device's disparity error, linear across the image
+  double finder_left_m = 0.0, finder_yaw_rad = 0.0;  ///< the range finder beside the axis, its beam askew
   bool silent_depth = false, silent_odometry = false, silent_range = false, somebody_walks_in = false;
 
   double now_s = 100.0;
@@ -49,7 +53,9 @@ struct WallRobot {
     }
     if (!silent_range && ticks_ % 10 == 0) {
       const double jump_m = ticks_ % 20 == 0 ? range_jump_m : 0.0;
-      input_.ranges_m.push_back(distance_m / std::cos(yaw_rad) + random_.normal(0.0, range_noise_m) + jump_m);
+      const double finder_m =
+          (distance_m + finder_left_m * std::sin(yaw_rad)) / std::cos(yaw_rad + finder_yaw_rad);
+      input_.ranges_m.push_back(finder_m + random_.normal(0.0, range_noise_m) + jump_m);
     }
     if (ticks_ % 3 == 0) under_way_.push_back({now_s, view()});
     if (!under_way_.empty() && under_way_.front().stamp_s + frame_delay_s <= now_s) {
@@ -74,7 +80,7 @@ struct WallRobot {
     SeenWall view;
     const double tilt = std::tan(yaw_rad + random_.normal(0.0, 0.0005));
     const double per_m = std::cos(yaw_rad) / distance_m - 0.003;
-    view.plane = {per_m, per_m * tilt, 0.0};
+    view.plane = {per_m, per_m * tilt + slant_per_m, 0.0};
     view.on_wall = 1.0;
     if (somebody_walks_in) view.fault = "the image's middle is no plane.";
     return view;
@@ -83,7 +89,7 @@ struct WallRobot {
   long ticks_ = 0;
   GuidedInput input_;
   std::deque<Frame> under_way_;
-  RandomStream random_{1, random_stream::kTest, 8, 0};
+  RandomStream random_;
 };
 
 /// Runs the guide on the robot until it ends, or `until` says so, or ten simulated minutes have gone.
