@@ -19,11 +19,11 @@ struct Options {
 
 const char* const kHelp =
     R"(Place the robot 0.55 to 1 m from a light, matt, flat wall that fills the Kinect's view from there and from 4 m, with
-4 m of free floor behind it: it drives backwards and sees nothing there. It turns square, stands, collects, backs off by
-about 10 %, and so on. Whatever is not as it should be stops it, and is said.
+4 m of free floor behind it: it drives backwards and sees nothing there. It turns square, stands, collects, turns by 10
+degrees to both sides, backs off by about 10 %, and so on. Whatever is not as it should be stops it, and is said.
 SESSION becomes a folder as calibrate_depth reads it (distances.csv, 16-bit PNG in mm, camera_info.yaml); every finished
 distance is kept, and --resume goes on with it. At the end the calibration is fitted as calibrate_depth does.
-Topic calibration_view (an image: rqt_image_view, rviz) shows the IR image and a cross; the range finder's beam and the
+Topic calibration_view (an image, for rviz or rqt_image_view) shows the IR image and a cross; the range finder's beam and the
 marker on the wall belong on the cross. Without IR it shows how the depth departs from a plane. Topic calibration_status
 (text) says what the robot does.
 How far, how fast, how many frames: parameters of the node calibrate_depth_live (docs/parameters.md), such as _step:=0.08.)";

@@ -138,7 +138,7 @@ void GuidedCalibration::move(const GuidedInput& input, GuidedStep* step) {
   direction_ = forward ? 1 : -1;
   const double yaw_rad = off_square_rad(input);
   if (std::abs(yaw_rad) > kWrongWay_rad) return enter(GuidedState::kSquareUp);
-  const double speed = std::min(config_.speed_mps, std::max(kSlowest_mps, 0.8 * std::abs(left_m)));
+  const double speed = std::min(config_.speed_mps, std::max(kSlowest_mps, 1.5 * std::abs(left_m)));
   step->forward_mps = forward ? speed : -speed;
   // A gentle hand on the wheel; what it leaves is turned away standing.
   step->turn_radps = std::clamp(-0.5 * yaw_rad, -config_.turn_min_radps, config_.turn_min_radps);

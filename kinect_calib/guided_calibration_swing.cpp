@@ -53,7 +53,7 @@ void GuidedCalibration::swing(const GuidedInput& input, GuidedStep* step) {
       step->turn_radps = to_go_rad > 0.0 ? speed : -speed;
       return;
     }
-    if (back) return enter(GuidedState::kSquareUp);
+    if (back) return start_moving();  // which holds it square as it goes
     swing_standing_ = true;
     swing_since_s_ = input.now_s;
     ranges_.clear();
