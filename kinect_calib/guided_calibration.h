@@ -48,7 +48,7 @@ struct GuidedStep {
   double forward_mps = 0.0, turn_radps = 0.0;
   GuidedState state = GuidedState::kWait;
   std::string text;          ///< what it does, or why it stands
-  std::string notice;        ///< once: why a distance is measured again
+  std::string notice;        ///< once: why a distance is measured again, what a swing gave
   bool keep_frame = false;   ///< the newest frame belongs to this distance
   bool drop_frames = false;  ///< those kept so far do not
   /// The frames kept are at this distance: call accept() or refuse() before the next step.

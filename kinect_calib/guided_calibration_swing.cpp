@@ -72,6 +72,10 @@ void GuidedCalibration::swing(const GuidedInput& input, GuidedStep* step) {
   (left ? swing_.left_range_m : swing_.right_range_m) = ranges_.median_m();
   if (left) return swing_to(SwingPhase::kRight);
   square_bias_.add(swing_);
+  notice_ = fmt::format(
+      "turned to {:.2f} deg: {:.4f} m, to {:.2f} deg: {:.4f} m; a square wall seems turned by {:.2f} deg.",
+      swing_.left_yaw_rad / kRadPerDeg, swing_.left_range_m, swing_.right_yaw_rad / kRadPerDeg,
+      swing_.right_range_m, square_bias_.apparent_yaw_rad(swing_.distance_m) / kRadPerDeg);
   swing_to(SwingPhase::kBack);
 }
 

@@ -8,7 +8,7 @@ namespace {
 
 // Beforehand: a finder mounted by eye and by hand; slants as the simulator's devices have them, 0.003 at
 // most.
-constexpr double kBeamSd_rad = 0.02, kLeverSd_m = 0.03, kSlantSd_radpm = 0.004;
+constexpr double kBeamSd_rad = 0.01, kLeverSd_m = 0.03, kSlantSd_radpm = 0.004;
 // Of a side's range: the finder's 2 mm over 16 readings, and the pivot that moves while the base turns. Of a
 // side's yaw: bands.
 constexpr double kRangeSd_m = 0.001, kYawSd_rad = 0.0007;

@@ -11,15 +11,16 @@
 namespace knav {
 namespace {
 
-// Of the image's width and height. Further out there is floor from 2 m on, and the sensor's error is largest.
-constexpr double kMiddle = 0.6;
+// Shares of the image. Further to the sides the sensor's error is largest. Below there is floor when the wall
+// is 4 m off; the same pixels judge all distances, or the device's slant would seem to change with it.
+constexpr double kMiddleColumns[2] = {0.2, 0.8}, kMiddleRows[2] = {0.1, 0.6};
 constexpr double kLeastOnWall = 0.5;
 // A leg at 3 m is 3 % of the middle; a wall's foot or a socket is less.
 constexpr double kMostOffWall = 0.02;
 constexpr double kMostTurned_deg = 20.0;
 constexpr double kMostPitched_deg = 5.0;  // the fit takes 7 degrees to any side
-// Farther off floor hides the wall's lower half, and what is left of the device's ring looks like pitch.
-constexpr double kPitchTold_m = 1.2;
+// Farther off what is above the middle of the device's ring looks like pitch.
+constexpr double kPitchTold_m = 0.8;
 
 }  // namespace
 
@@ -27,8 +28,9 @@ WallViewer::WallViewer(const PinholeModel& camera) : tiles_(camera) {
   const TileGrid& grid = tiles_.gate_grid();
   for (int r = 0; r < grid.rows; ++r) {
     for (int c = 0; c < grid.columns; ++c) {
-      const bool middle = std::abs((c + 0.5) / grid.columns - 0.5) < 0.5 * kMiddle &&
-                          std::abs((r + 0.5) / grid.rows - 0.5) < 0.5 * kMiddle;
+      const double across = (c + 0.5) / grid.columns, down = (r + 0.5) / grid.rows;
+      const bool middle = across > kMiddleColumns[0] && across < kMiddleColumns[1] && down > kMiddleRows[0] &&
+                          down < kMiddleRows[1];
       in_middle_.push_back(middle ? 1 : 0);
       middle_count_ += middle ? 1 : 0;
     }
