@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "core/error.h"
 #include "kinect_calib/kinect_noise.h"
+#include "kinect_calib/wall_plane.h"
 
 namespace knav {
 namespace {
@@ -37,8 +37,7 @@ TileGrid::TileGrid(const PinholeModel& camera, int side_px)
   }
 }
 
-/// frame -> per_m_: each tile's mean inverse depth, NaN where too little answered or what answers is floor.
-void WallTiles::average_gate_tiles(const cv::Mat& frame) {
+const std::vector<double>& WallTiles::average_gate_tiles(const cv::Mat& frame) {
   per_m_.assign(grid_.count(), kNaN);
   std::vector<double> values;
   for (int r = 0; r < grid_.rows; ++r) {
@@ -74,47 +73,29 @@ void WallTiles::average_gate_tiles(const cv::Mat& frame) {
       per_m_[grid_.index(r, c)] = sum / near;
     }
   }
+  return per_m_;
 }
 
 void WallTiles::find(const cv::Mat& frame, double distance_m) {
   average_gate_tiles(frame);
-  Eigen::Vector3d plane(0.0, 0.0, 1.0 / distance_m);  // of inverse depth, in (x, y, 1)
-  const auto expected = [&](std::size_t tile) {
-    return plane[0] * grid_.x[tile] + plane[1] * grid_.y[tile] + plane[2];
-  };
+  WallPlane plane{1.0 / distance_m};
   const int enough = static_cast<int>(grid_.count()) * 2 / 5;
-  int kept = 0;
-  for (const double tolerance : {0.2, 0.12, 0.08, 0.08}) {
-    Eigen::Matrix3d A = Eigen::Matrix3d::Identity() * 1e-9;
-    Eigen::Vector3d b = Eigen::Vector3d::Zero();
-    kept = 0;
-    for (std::size_t tile = 0; tile < grid_.count(); ++tile) {
-      // What is an error in disparity is a larger share of the inverse depth the farther the wall.
-      const double most = tolerance * expected(tile) + 4.0 * kInverseDepthPerCode;
-      if (!(std::abs(per_m_[tile] - expected(tile)) <= most)) continue;
-      const Eigen::Vector3d terms(grid_.x[tile], grid_.y[tile], 1.0);
-      A += terms * terms.transpose();
-      b += terms * per_m_[tile];
-      ++kept;
-    }
-    if (kept < enough) break;
-    plane = A.ldlt().solve(b);
-  }
+  const int kept = fit_wall_plane(grid_, per_m_, enough, &plane);
   if (kept < enough) {
     throw UserError(
         fmt::format("the frame said to be {:.2f} m from a wall shows one in {} of {} tiles; the wall must "
                     "fill most of the view, at that distance.",
                     distance_m, kept, grid_.count()));
   }
-  const double tilt = plane.head<2>().norm() / plane[2];
-  if (tilt > 0.12) {
+  if (plane.tilt() > kMostTilt) {
     throw UserError(
         fmt::format("the frame {:.2f} m from a wall is {:.0f} degrees off square; at most 7 will do.",
-                    distance_m, std::atan(tilt) * 180.0 / M_PI));
+                    distance_m, std::atan(plane.tilt()) * 180.0 / M_PI));
   }
   for (std::size_t tile = 0; tile < grid_.count(); ++tile) {
-    const double most = 0.08 * expected(tile) + 4.0 * kInverseDepthPerCode;
-    if (!(std::abs(per_m_[tile] - expected(tile)) <= most)) per_m_[tile] = kNaN;
+    const double expected = plane.at(grid_.x[tile], grid_.y[tile]);
+    if (!(std::abs(per_m_[tile] - expected) <= wall_tolerance_per_m(kWallShare, expected)))
+      per_m_[tile] = kNaN;
   }
 }
 

@@ -27,6 +27,8 @@ class WallTiles {
  public:
   static constexpr int kGateTile_px = 16;
 
+  static constexpr double kMostTilt = 0.12;  ///< tangent of how far off square a wall may be
+
   explicit WallTiles(const PinholeModel& camera) : grid_(camera, kGateTile_px) {}
 
   /// @param frame      32FC1 m, NaN invalid
@@ -37,9 +39,11 @@ class WallTiles {
   /// find() first, with the same frame.
   void average(const cv::Mat& frame, const TileGrid& grid, std::vector<double>* per_m) const;
 
- private:
-  void average_gate_tiles(const cv::Mat& frame);
+  /// Mean inverse depth [1/m] per tile of 16 px, NaN where too little answered or what answers is floor.
+  const std::vector<double>& average_gate_tiles(const cv::Mat& frame);
+  const TileGrid& gate_grid() const { return grid_; }
 
+ private:
   TileGrid grid_;
   std::vector<double> per_m_;  // NaN: not the wall
 };

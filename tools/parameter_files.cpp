@@ -11,6 +11,7 @@
 #include "global_map_builder/map_server_config.h"
 #include "global_map_builder/live_map_builder_config.h"
 #include "global_map_builder/mapping_recorder_config.h"
+#include "kinect_calib/guided_calibration_config.h"
 #include "kinect_sim/simulator_node_config.h"
 #include "kinect_sim/tour_driver_config.h"
 #include "openni2_driver/openni2_camera_config.h"
@@ -42,6 +43,7 @@ std::vector<Section> all_sections() {
   return {
       section<OpenNI2CameraConfig>("openni2_camera", "The Kinect, or any OpenNI2 device or .oni file."),
       section<DepthCorrectionConfig>("depth_correction", "Lens rectification and depth correction."),
+      section<GuidedCalibrationConfig>("calibrate_depth_live", "The guided depth calibration."),
       section<RollingShutterConfig>("rolling_shutter", "Undoes the turning of the camera while a frame is read."),
       section<FloorRemovalConfig>("floor_removal", "Finds the floor, and keeps the slice of the world above it."),
       section<DepthProfileConfig>("depth_profile", "One depth per image column."),

@@ -13,7 +13,8 @@ import rospkg
 import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-ARGUMENTS = {"live_mapping.launch": ["directory:=/tmp/map"], "mapping.launch": ["bag:=/tmp/drive.bag"], "navigation.launch": ["map:=/tmp/map"],
+ARGUMENTS = {"calibrate_depth.launch": ["session:=/tmp/walls", "out:=/tmp/kinect.yaml"],
+             "live_mapping.launch": ["directory:=/tmp/map"], "mapping.launch": ["bag:=/tmp/drive.bag"], "navigation.launch": ["map:=/tmp/map"],
              "replay.launch": ["bag:=/tmp/drive.bag"]}
 LAUNCH_FILES = sorted(path.name for path in (ROOT / "launch").glob("*.launch"))
 

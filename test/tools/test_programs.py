@@ -15,8 +15,8 @@ from sensor_msgs.msg import LaserScan
 
 PROGRAMS = pathlib.Path(sys.argv[1])
 PROGRAM_NAMES = ("replay", "build_map", "import_carmen", "import_depth_images", "evaluate_trajectory", "calibrate_depth",
-                 "calibrate_extrinsics", "calibrate_intrinsics", "check_robot", "score_walls", "optimize_graph",
-                 "map_info", "localize")
+                 "calibrate_depth_live", "calibrate_extrinsics", "calibrate_intrinsics", "check_robot", "score_walls",
+                 "optimize_graph", "map_info", "localize")
 # Only with the simulator (-DKINECT_NAV_SIM=ON).
 PROGRAM_NAMES += tuple(n for n in ("sensor_benchmark", "compare_sensor_model") if (PROGRAMS / n).exists())
 
@@ -75,6 +75,11 @@ class Programs(unittest.TestCase):
             code, text = run(name, "--no-such-option")
             self.assertEqual(code, 1, name + text)
             self.assertIn("--help", text, name)
+
+    def test_the_guided_calibration_says_that_no_robot_runs(self):
+        os.environ["ROS_MASTER_URI"] = "http://127.0.0.1:9"  # nobody listens there
+        self.assert_refused(run("calibrate_depth_live", self.dir / "walls", "--out", self.dir / "out.yaml"), "master")
+        self.assert_only()
 
     def test_missing_empty_and_malformed_bags_are_refused(self):
         empty = self.dir / "empty.bag"
