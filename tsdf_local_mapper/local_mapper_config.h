@@ -6,6 +6,7 @@
 #include "core/contour.h"
 #include "core/motion_model.h"
 #include "core/tsdf_grid.h"
+#include "tsdf_local_mapper/steady_errors.h"
 
 namespace knav {
 
@@ -36,12 +37,11 @@ struct FilterConfig {
   int particles = 1000;
   int readings = 120;
   std::string alignment_cost = "normalized";
-  double temperature = 0.003;
+  double temperature = 0.006;
   double paper_temperature = 0.02;
   double unknown_price = 0.6;
   int refinements = 0;
-  double odometry_learning_m = 0.0;
-  double depth_trust_m = 0.0;
+  double depth_trust_m = 3.0;
   double evidence_period_s = 0.3;
 
   template <class Visitor>
@@ -58,13 +58,10 @@ struct FilterConfig {
     v.number("unknown_price", unknown_price, 0, 1, "", "normalized: cost of a reading in a cell never seen.");
     v.integer("refinements", refinements, 0, 10, "",
               "Rounds of resampling with shrinking noise within a frame.");
-    v.number(
-        "odometry_learning_m", odometry_learning_m, 0, 1000, "m",
-        "Distance over which odometry's steady errors are learned and taken out of the proposal; 0 = never.");
     v.number("depth_trust_m", depth_trust_m, 0, 100, "m",
-             "DepthProfile: at this range a reading counts half, beyond less with the range squared, as a "
-             "depth camera's "
-             "systematic errors grow; 0 = all count the same.");
+             "DepthProfile: at this range a reading of a surface seen square counts half, beyond less with the range "
+             "squared, as a depth camera's steady errors along the ray grow; at a sharp angle they do not matter. 0 = all "
+             "count the same.");
     v.number("evidence_period_s", evidence_period_s, 0, 10, "s",
              "Frames closer together than this share errors, and so count by the share of it that has "
              "passed; 0 = every frame "
@@ -137,6 +134,7 @@ struct LocalMapperConfig {
   WindowConfig window;
   FilterConfig filter;
   MotionModelConfig motion;
+  SteadyErrorsConfig odometry_errors;
   ContourConfig contour;
   ContinuityConfig continuity;
   LocalMapperRosConfig ros;
@@ -156,7 +154,8 @@ struct LocalMapperConfig {
     v.group("tsdf", tsdf, "The signed distance grid.");
     v.group("window", window, "What the map remembers.");
     v.group("filter", filter, "The particle filter.");
-    v.group("motion", motion, "How wrong odometry may be.");
+    v.group("motion", motion, "How wrong odometry may be from step to step.");
+    v.group("odometry_errors", odometry_errors, "How wrong it may be steadily, which the filter learns.");
     v.group("contour", contour, "The virtual 360-degree scan.");
     v.group("continuity", continuity, "Gaps, jumps and being carried.");
     v.group("ros", ros, "Frames and rates of the nodelet; no effect offline.");

@@ -14,9 +14,11 @@ namespace {
 constexpr int kHypotheses = 24;
 }  // namespace
 
-PoseFilter::PoseFilter(const FilterConfig& config, const MotionModelConfig& motion, std::uint64_t seed)
-    : config_(config), motion_(motion), seed_(seed) {
+PoseFilter::PoseFilter(const FilterConfig& config, const MotionModelConfig& motion, const SteadyErrorsConfig& errors,
+                       std::uint64_t seed)
+    : config_(config), motion_(motion), seed_(seed), odometry_errors_(errors, seed) {
   particles_.resize(static_cast<std::size_t>(config.particles));
+  odometry_errors_.draw(particles_.size(), step_++);
   ancestor_.resize(particles_.size());
   start_at(Pose2{}, 0.0);
 }
@@ -33,7 +35,8 @@ void PoseFilter::start_at(const Pose2& pose, double stamp_s) {
 }
 
 void PoseFilter::predict(const Pose2& T_before_after) {
-  sample_motion(motion_, T_before_after, seed_, random_stream::kMotion, step_++, particles_);
+  sample_motion(motion_, T_before_after, seed_, random_stream::kMotion, step_, particles_);
+  odometry_errors_.apply(T_before_after, step_++, &particles_);
 }
 
 void PoseFilter::shift(const Pose2& T_before_after) {
@@ -71,6 +74,7 @@ void PoseFilter::resample() {
   ancestor_scratch_.resize(parent_.size());
   for (std::size_t i = 0; i < parent_.size(); ++i) ancestor_scratch_[i] = ancestor_[parent_[i]];
   ancestor_.swap(ancestor_scratch_);
+  odometry_errors_.resample(parent_);
 }
 
 void PoseFilter::jitter(const Pose2& center, const Eigen::Matrix3d& covariance, double width) {

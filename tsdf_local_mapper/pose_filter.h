@@ -8,6 +8,7 @@
 #include "core/particle_filter.h"
 #include "core/tsdf_grid.h"
 #include "tsdf_local_mapper/local_mapper_config.h"
+#include "tsdf_local_mapper/steady_errors.h"
 
 namespace knav {
 
@@ -15,9 +16,10 @@ namespace knav {
 /// observation model is the alignment cost on the signed distance map.
 class PoseFilter {
  public:
-  PoseFilter(const FilterConfig& config, const MotionModelConfig& motion, std::uint64_t seed);
+  PoseFilter(const FilterConfig& config, const MotionModelConfig& motion, const SteadyErrorsConfig& errors,
+             std::uint64_t seed);
 
-  /// All particles at one pose.
+  /// All particles at one pose. What was learned of odometry's errors stays: it is the same robot.
   void start_at(const Pose2& pose, double stamp_s);
   /// Odometry's step with its noise.
   void predict(const Pose2& T_before_after);
@@ -48,6 +50,7 @@ class PoseFilter {
   MotionModelConfig motion_;
   std::uint64_t seed_;
   std::uint64_t step_ = 0;
+  SteadyErrors odometry_errors_;
   ParticleSet particles_;
   std::vector<float> cost_;
   std::vector<std::uint32_t> parent_, ancestor_, ancestor_scratch_;
