@@ -60,11 +60,6 @@ void make_paper(LocalMapperConfig* config) {
   config->window.clock = "paper";
   config->contour.surface_within = 1.0;
   config->tsdf.appear_range_m = 0.0;
-  config->filter.depth_trust_m = 0.0;
-  config->odometry_errors.memory_m = 0.0;
-  config->motion.translation_per_translation = 0.1;
-  config->motion.sideways_per_translation = 0.05;
-  config->motion.translation_floor_m = 0.002;
 }
 
 nlohmann::json to_json(const ErrorStatistics& e, double length_m) {

@@ -5,13 +5,11 @@
 namespace knav {
 
 LocalMapperConfig::LocalMapperConfig() {
-  // Distances are steadily wrong, which odometry_errors holds, far more than from step to step; turns are both.
-  motion.translation_per_translation = 0.03;
+  motion.translation_per_translation = 0.1;
   motion.translation_per_rotation = 0.05;
   motion.rotation_per_translation = 0.25;
   motion.rotation_per_rotation = 0.35;
-  motion.sideways_per_translation = 0.02;
-  motion.translation_floor_m = 0.0003;
+  motion.sideways_per_translation = 0.05;
 }
 
 std::vector<std::string> LocalMapperConfig::validate() const {

@@ -37,11 +37,11 @@ struct FilterConfig {
   int particles = 1000;
   int readings = 120;
   std::string alignment_cost = "normalized";
-  double temperature = 0.006;
+  double temperature = 0.003;
   double paper_temperature = 0.02;
   double unknown_price = 0.6;
   int refinements = 0;
-  double depth_trust_m = 3.0;
+  double depth_trust_m = 0.0;
   double evidence_period_s = 0.3;
 
   template <class Visitor>

@@ -62,6 +62,7 @@ TEST(SteadyErrors, SpreadWithTheDistanceNotWithItsRoot) {
 TEST(SteadyErrors, WhatTheViewChoseIsKnownWhereThereIsNoView) {
   // Odometry that reads 4 % short. After 5 m something is in view that tells: those within 2 cm of 5.2 m survive.
   SteadyErrorsConfig config;
+  config.memory_m = 100.0;
   config.turn_per_m_sd = 0.0;
   SteadyErrors errors(config, 2);
   std::uint64_t step = 0;
@@ -94,7 +95,9 @@ TEST(SteadyErrors, OffTheyChangeNothingAndSameSeedSameBytes) {
   EXPECT_EQ(*std::max_element(particles.x_m.begin(), particles.x_m.end()), 0.0);
   ParticleSet first = at_origin(), second = at_origin();
   for (ParticleSet* set : {&first, &second}) {
-    SteadyErrors errors(SteadyErrorsConfig{}, 4);
+    SteadyErrorsConfig config;
+    config.memory_m = 100.0;
+    SteadyErrors errors(config, 4);
     std::uint64_t own = 0;
     errors.draw(kParticles, own++);
     drive(0.5, &own, &errors, set);
