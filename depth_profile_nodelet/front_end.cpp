@@ -1,6 +1,7 @@
 #include "depth_profile_nodelet/front_end.h"
 
 #include "core/config.h"
+#include "core/config_sections.h"
 
 namespace knav {
 
@@ -17,6 +18,7 @@ std::vector<std::string> FrontEndConfig::validate() const {
 }
 
 FrontEndConfig FrontEndConfig::from_file(const std::string& path) {
+  refuse_unknown_sections(path);
   FrontEndConfig config;
   config.depth_correction = read_config_section<DepthCorrectionConfig>(path, "depth_correction");
   config.rolling_shutter = read_config_section<RollingShutterConfig>(path, "rolling_shutter");

@@ -2,6 +2,8 @@
 
 #include <filesystem>
 
+#include "core/config_sections.h"
+#include "core/error.h"
 #include "core/file_io.h"
 #include "tools/parameter_files.h"
 
@@ -33,6 +35,21 @@ TEST(ParameterReference, IsWhatTheStructsSay) {
 TEST(ParameterReference, EveryParameterHasAMeaning) {
   for (const ParameterSection& section : all_parameter_sections()) {
     for (const ParameterDescription& p : section.parameters) EXPECT_FALSE(p.text.empty()) << section.name << "/" << p.name;
+  }
+}
+
+TEST(ConfigurationSections, AreThoseOfTheStructsAndASlipIsRefusedWithASuggestion) {
+  std::vector<std::string> described;
+  for (const ParameterSection& section : all_parameter_sections()) described.push_back(section.name);
+  EXPECT_EQ(config_section_names(), described);
+  EXPECT_NO_THROW(refuse_unknown_sections(kRoot / "config" / "default.yaml"));
+  const std::string path = testing::TempDir() + "/slip.yaml";
+  write_text_atomically(path, "local_maper: {seed: 1}\n");
+  try {
+    refuse_unknown_sections(path);
+    ADD_FAILURE() << "not refused";
+  } catch (const UserError& error) {
+    EXPECT_EQ(std::string(error.what()), path + ": unknown section 'local_maper'; did you mean 'local_mapper'?");
   }
 }
 

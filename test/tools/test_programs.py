@@ -123,6 +123,10 @@ class Programs(unittest.TestCase):
                             "partciles", "did you mean 'filter/particles'")
         config.write_text("local_mapper: {filter: {particles: -5}}\n")
         self.assert_refused(run("replay", bag, "--trajectory", self.dir / "out.tum", "--config", config), "particles")
+        config.write_text("local_maper: {filter: {particles: 5}}\n")
+        for program, output in (("replay", ("--trajectory", self.dir / "out.tum")), ("build_map", ("--out", self.dir / "map"))):
+            self.assert_refused(run(program, bag, *output, "--config", config), config, "local_maper",
+                                "did you mean 'local_mapper'")
         config.write_text("local_mapper: [\n")
         self.assert_refused(run("replay", bag, "--trajectory", self.dir / "out.tum", "--config", config), config, "line")
         self.assert_only("drive.bag", "config.yaml")
