@@ -104,8 +104,8 @@ struct RecoveryConfig {
 
 /// Silence stops the robot, and so does data that comes late.
 struct FreshnessConfig {
-  double scan_s = 0.2;
-  double pose_s = 0.2;
+  double scan_s = 0.18;
+  double pose_s = 0.18;
   double localization_s = 3.0;
   double latency_s = 0.5;
   double give_up_s = 15.0;
