@@ -38,6 +38,12 @@ struct MotionModelConfig {
   std::vector<std::string> validate() const { return {}; }
 };
 
+/// Standard deviations of one step's noise, in the robot's frame.
+struct MotionNoise {
+  double forward_m = 0.0, sideways_m = 0.0, turn_rad = 0.0;
+};
+MotionNoise motion_noise(const MotionModelConfig& config, const Pose2& T_before_after);
+
 /// Moves every particle by the odometry increment plus its own noise.
 /// @param T_before_after the increment in the robot's frame
 /// @param seed, stream, step  see RandomStream; particle i draws from index i

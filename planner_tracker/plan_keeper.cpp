@@ -10,6 +10,11 @@ namespace {
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// Farther from the old path than this, the robot is on another.
 constexpr double kOffPath_m = 0.5;
+constexpr double kNearestLook_m = 0.25;
+constexpr double kStandsBefore_m = 0.6;  ///< what closes a way may reach this far before the point where it does
+constexpr double kTooNear = 0.75;        ///< of look_distance_m
+constexpr int kDirections = 24;
+constexpr int kMostTried = 4;
 
 }  // namespace
 
@@ -40,27 +45,58 @@ double PlanKeeper::old_cost_m(const MapLayer& layer, const Point2& robot) {
   return cost;
 }
 
-bool PlanKeeper::cut_at_blockage(const MapLayer& layer, std::vector<Point2>* way) {
+bool PlanKeeper::cut_at_blockage(const CombinedMap& map, std::vector<Point2>* way) {
+  const MapLayer& layer = map.combined();
   const double step = 0.5 * layer.geometry.resolution_m;
-  std::vector<Point2> kept{way->front()};
-  double along = 0.0;
+  std::vector<Point2> passed{way->front()};  // every step of the way before the blockage
   for (std::size_t i = 1; i < way->size(); ++i) {
     const Point2 a = (*way)[i - 1], b = (*way)[i];
     const double length = std::hypot(b.x_m - a.x_m, b.y_m - a.y_m);
-    for (double s = step; s < length; s += step) {
-      const Point2 p{a.x_m + (b.x_m - a.x_m) * s / length, a.y_m + (b.y_m - a.y_m) * s / length};
-      if (planner_.open(layer, p) || along + s < 2.0 * step) continue;
+    for (double s = step; s < length + step; s += step) {
+      const double share = std::min(1.0, s / length);
+      const Point2 p{a.x_m + (b.x_m - a.x_m) * share, a.y_m + (b.y_m - a.y_m) * share};
+      if (planner_.open(layer, p) || passed.size() < 3) {
+        passed.push_back(p);
+        continue;
+      }
       at_ = p;
-      // A little short of it, so that it is in view.
-      const double back = std::max(0.0, s - 0.25);
-      kept.push_back({a.x_m + (b.x_m - a.x_m) * back / length, a.y_m + (b.y_m - a.y_m) * back / length});
-      way->swap(kept);
+      std::size_t end = passed.size() - 1;
+      const auto away_m = [&](std::size_t k) { return std::hypot(passed[k].x_m - p.x_m, passed[k].y_m - p.y_m); };
+      while (end > 0 && away_m(end - 1) <= config_.planning.look_distance_m &&
+             std::isfinite(planner_.segment_cost_m(map.global(), passed[end - 1], p))) {
+        --end;
+      }
+      // Never right up to it.
+      while (end > 0 && away_m(end) < kNearestLook_m) --end;
+      passed.resize(end + 1);
+      way->swap(passed);
       return true;
     }
-    kept.push_back(b);
-    along += length;
   }
-  way->swap(kept);
+  return false;
+}
+
+bool PlanKeeper::way_to_look(const CombinedMap& map, const Point2& robot, std::vector<Point2>* way) {
+  std::vector<Point2> places;
+  for (const double share : {1.0, 1.25}) {
+    for (int k = 0; k < kDirections; ++k) {
+      const double angle = 2.0 * kPi * k / kDirections, r = share * config_.planning.look_distance_m;
+      const double c = std::cos(angle), s = std::sin(angle);
+      const Point2 place{at_.x_m + r * c, at_.y_m + r * s}, before{at_.x_m + kStandsBefore_m * c, at_.y_m + kStandsBefore_m * s};
+      if (std::isfinite(planner_.segment_cost_m(map.combined(), place, before)) &&
+          std::isfinite(planner_.segment_cost_m(map.global(), before, at_))) {
+        places.push_back(place);
+      }
+    }
+  }
+  const auto away_m = [&](const Point2& p) { return std::hypot(p.x_m - robot.x_m, p.y_m - robot.y_m); };
+  std::sort(places.begin(), places.end(), [&](const Point2& a, const Point2& b) { return away_m(a) < away_m(b); });
+  for (std::size_t i = 0; i < std::min<std::size_t>(kMostTried, places.size()); ++i) {
+    planner_.plan(map.combined(), robot, places[i], &result_);
+    if (result_.code != PlanCode::kOk) continue;
+    *way = result_.path;
+    return true;
+  }
   return false;
 }
 
@@ -99,16 +135,27 @@ PlanKeeper::Outcome PlanKeeper::replan(const CombinedMap& map, const Point2& rob
     return Outcome::kStartBlocked;
   }
   // No way now. Has the unchanged map one, and where is it closed?
-  planner_.plan(map.global(), robot, goal, &result_);
+  // Random moves may have led to where only the local map knows the floor.
+  Point2 start = robot;
+  if (!planner_.open(map.global(), robot)) planner_.nearest_open(map.global(), robot, config_.planning.goal_snap_m, &start);
+  planner_.plan(map.global(), start, goal, &result_);
   if (result_.code != PlanCode::kOk) {
     at_ = result_.at;
     path_.clear();
     return Outcome::kNoPath;
   }
   std::vector<Point2> way = result_.path;
-  if (!cut_at_blockage(layer, &way)) at_ = goal;
-  const bool keep = path_kind_ == Outcome::kToBlockage && std::isfinite(old_cost_m(layer, robot));
-  if (!keep) take(way);
+  if (!cut_at_blockage(map, &way)) at_ = goal;
+  const auto too_near = [&](const Point2& p) {
+    return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kTooNear * config_.planning.look_distance_m;
+  };
+  const bool robot_too_near = too_near(robot);
+  const bool keep = path_kind_ == Outcome::kToBlockage && std::isfinite(old_cost_m(layer, robot)) &&
+                    !(robot_too_near && too_near(path_.end()));
+  if (!keep) {
+    if (robot_too_near) way_to_look(map, robot, &way);
+    take(way);
+  }
   path_kind_ = Outcome::kToBlockage;
   return Outcome::kToBlockage;
 }

@@ -43,8 +43,11 @@ class PlanKeeper {
  private:
   double old_cost_m(const MapLayer& layer, const Point2& robot);
   void take(const std::vector<Point2>& path);
-  /// Keeps the beginning of a way, up to where the layer closes it (at_). False if nothing of it is left.
-  bool cut_at_blockage(const MapLayer& layer, std::vector<Point2>* way);
+  /// Finds where the layer closes a way of the unchanged map (at_), and keeps the way's beginning up to where the robot
+  /// can look at that from look_distance_m, or nearer where corners hide it. False if the layer does not close it.
+  bool cut_at_blockage(const CombinedMap& map, std::vector<Point2>* way);
+  /// A way to the nearest place from which the blockage can be looked at, for a robot that stands too near to it.
+  bool way_to_look(const CombinedMap& map, const Point2& robot, std::vector<Point2>* way);
 
   PlannerTrackerConfig config_;
   GridPlanner planner_;

@@ -32,6 +32,8 @@ const char* to_string(Activity activity) {
       return "waiting for the way to clear";
     case Activity::kApproaching:
       return "going to see whether the way is still closed";
+    case Activity::kBackingUp:
+      return "recovery: backing up to see more";
     case Activity::kAvoiding:
       return "recovery: reactive avoidance";
     case Activity::kStopped:
@@ -129,7 +131,7 @@ void PlannerTracker::State::begin(const Pose2& T_map_goal) {
   keeper.start_goal();
   tracker.reset();
   moves.end();
-  next_plan_s = missing_since_s = blocked_since_s = lost_since_s = -1.0;
+  next_plan_s = missing_since_s = blocked_since_s = looking_since_s = near_since_s = lost_since_s = -1.0;
   avoidances = 0;
 }
 

@@ -39,6 +39,7 @@ enum class Activity {
   kAligning,     ///< in place, at the goal
   kWaiting,      ///< something is in the way
   kApproaching,  ///< the way is closed further on; goes there to look
+  kBackingUp,    ///< from something too near to be seen well
   kAvoiding,     ///< reactive avoidance
   kStopped,      ///< data missing
   kLostTurning,  ///< not localized: looks round

@@ -35,6 +35,8 @@ struct PlanningConfig {
   double switch_gain_m = 0.30;
   double controller_patience = 3.0;
   double blocked_timeout_s = 40.0;
+  double look_distance_m = 1.8;
+  double back_up_after_s = 1.5;
   double slowness = 5.0;
   double goal_snap_m = 1.5;
 
@@ -48,6 +50,11 @@ struct PlanningConfig {
              "avoidance.");
     v.number("blocked_timeout_s", blocked_timeout_s, 1, 600, "s",
              "Without progress for this long the goal fails.");
+    v.number("look_distance_m", look_distance_m, 0.3, 5, "m",
+             "A closed way is looked at from this far: nearer, a level Kinect does not see whether it is free again.");
+    v.number("back_up_after_s", back_up_after_s, 0, 60, "s",
+             "Standing this long before something nearer than that, the robot backs up to that distance, where it is known "
+             "to be free behind: it sees more, and whoever wants to pass can; 0 = never.");
     v.number("slowness", slowness, 1, 100, "",
              "The goal fails after 60 s plus this many times what its first plan takes at full speed.");
     v.number("goal_snap_m", goal_snap_m, 0, 5, "m",

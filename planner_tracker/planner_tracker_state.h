@@ -44,6 +44,8 @@ struct PlannerTracker::State {
   bool given_up(double now_s, const RobotState& robot);
   bool avoiding(double now_s, const RobotState& robot);
   void drive(double now_s, const RobotState& robot);
+  bool looking(double now_s, const RobotState& robot);
+  bool backing_up(double now_s, const RobotState& robot, const Point2& from);
 
   void act(Activity activity, const TrackOutput& output);
   /// Ends the goal as failed.
@@ -80,6 +82,7 @@ struct PlannerTracker::State {
   double blocked_since_s = -1.0;
   Point2 blocked_at;
   double looking_since_s = -1.0;  ///< standing before a closed way
+  double near_since_s = -1.0;     ///< ... or anything else in the way, too near to see well
   int avoidances = 0;
   double lost_since_s = -1.0, found_since_s = -1.0, turned_rad = 0.0, last_yaw_rad = 0.0;
   bool lost_turn_done = false;

@@ -11,8 +11,7 @@ namespace {
 
 constexpr double kFoundFor_s = 0.5;        ///< localized for this long ends the recovery
 constexpr double kFailedPlanWait_s = 1.0;  ///< a search that finds nothing is the dearest
-constexpr double kReplanOnEnd_m = 0.15;
-constexpr double kFloorSeenFrom_m = 1.5;  ///< a level Kinect at 0.5 m sees the floor from 1.3 m on
+constexpr double kFloorSeenFrom_m = 1.2;  ///< nearer, a level Kinect at 0.5 m does not see the floor
 
 Point2 position(const Pose2& pose) { return {pose.x_m, pose.y_m}; }
 
@@ -251,7 +250,7 @@ bool PlannerTracker::State::avoiding(double now_s, const RobotState& robot) {
                        std::hypot(keeper.at().x_m - robot.T_map_base.x_m,
                                   keeper.at().y_m - robot.T_map_base.y_m) < kFloorSeenFrom_m;
     if (!waited && !oscillating && !stuck && !blind) return false;
-    blocked_since_s = looking_since_s = -1.0;
+    blocked_since_s = looking_since_s = near_since_s = -1.0;
     watch.dithering_s(now_s, robot.T_odom_base, false, 0.0);
     ++avoidances;
     moves.start(blind ? 4 : 2);
@@ -280,14 +279,7 @@ void PlannerTracker::State::drive(double now_s, const RobotState& robot) {
   }
   const bool to_goal = outcome == Outcome::kToGoal;
   const double remaining = path.remaining_m() + path.offset_m();
-  if (!to_goal && remaining < kReplanOnEnd_m) {
-    // Arrived where it is closed: looks at it.
-    if (looking_since_s < 0.0) looking_since_s = now_s;
-    const Point2 p = robot.T_map_base.inverse() * keeper.at();
-    const double bearing = std::atan2(p.y_m, p.x_m);
-    act(Activity::kWaiting, std::abs(bearing) > 0.2 ? tracker.turn(input, bearing) : tracker.stop(input));
-    return;
-  }
+  if (!to_goal && looking(now_s, robot)) return;
   looking_since_s = -1.0;
   if (to_goal && config.min_vel_x < 0.0 && remaining < 0.3) {
     // A goal just overshot, straight behind: back up over what was just driven, if it is still seen free.
@@ -305,10 +297,11 @@ void PlannerTracker::State::drive(double now_s, const RobotState& robot) {
   if (out.kind == TrackOutput::Kind::kBlocked) {
     if (blocked_since_s < 0.0) blocked_since_s = now_s;
     blocked_at = out.obstacle;
+    if (backing_up(now_s, robot, blocked_at)) return;
     act(Activity::kWaiting, out);
     return;
   }
-  blocked_since_s = -1.0;
+  blocked_since_s = near_since_s = -1.0;
   act(out.kind == TrackOutput::Kind::kTurning ? Activity::kTurning
       : to_goal                               ? Activity::kDriving
                                               : Activity::kApproaching,

@@ -56,6 +56,13 @@ Row row_named(const std::string& name) {
 
 void make_paper(LocalMapperConfig* config) {
   config->filter.alignment_cost = "paper";
+  config->filter.misfit_cost = config->filter.depth_trust_m = 0.0;
+  config->odometry_errors.memory_m = 0.0;
+  config->motion.translation_per_rotation = 0.05;
+  config->motion.rotation_per_rotation = 0.35;
+  config->motion.sideways_per_translation = 0.05;
+  config->motion.translation_floor_m = 0.002;
+  config->motion.rotation_floor_rad = 0.001;
   config->tsdf.truncation.behind_power = 0;
   config->window.clock = "paper";
   config->contour.surface_within = 1.0;

@@ -6,10 +6,12 @@ namespace knav {
 
 LocalMapperConfig::LocalMapperConfig() {
   motion.translation_per_translation = 0.1;
-  motion.translation_per_rotation = 0.05;
+  motion.translation_per_rotation = 0.03;
   motion.rotation_per_translation = 0.25;
-  motion.rotation_per_rotation = 0.35;
-  motion.sideways_per_translation = 0.05;
+  motion.rotation_per_rotation = 0.2;
+  motion.sideways_per_translation = 0.03;
+  motion.translation_floor_m = 0.0003;
+  motion.rotation_floor_rad = 0.0001;
 }
 
 std::vector<std::string> LocalMapperConfig::validate() const {

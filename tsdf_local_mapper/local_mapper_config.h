@@ -37,11 +37,12 @@ struct FilterConfig {
   int particles = 1000;
   int readings = 120;
   std::string alignment_cost = "normalized";
-  double temperature = 0.003;
+  double temperature = 0.0003;
+  double misfit_cost = 0.03;
   double paper_temperature = 0.02;
   double unknown_price = 0.6;
   int refinements = 0;
-  double depth_trust_m = 0.0;
+  double depth_trust_m = 3.0;
   double evidence_period_s = 0.3;
 
   template <class Visitor>
@@ -52,7 +53,11 @@ struct FilterConfig {
     v.choice("alignment_cost", alignment_cost, {"paper", "normalized"},
              "paper: sum of |F W| (equation 7). normalized: mean of |F|, with a price for unknown cells.");
     v.number("temperature", temperature, 1e-5, 1, "",
-             "normalized: a cost difference this large means a factor e.");
+             "normalized: a cost difference this large means a factor e, for a frame that fits without a rest and all "
+             "of whose readings have a full say.");
+    v.number("misfit_cost", misfit_cost, 0, 1, "",
+             "normalized: when even the best hypothesis costs this much, the temperature is twice as high; at more, more: a "
+             "frame that fits the map badly (clutter seen from another height, people) is trusted less. 0 = never.");
     v.number("paper_temperature", paper_temperature, 1e-5, 10, "",
              "paper: the same, times the mean weight W.");
     v.number("unknown_price", unknown_price, 0, 1, "", "normalized: cost of a reading in a cell never seen.");

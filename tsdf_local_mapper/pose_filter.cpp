@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "core/fast_math.h"
 #include "core/random.h"
@@ -12,13 +13,19 @@
 namespace knav {
 namespace {
 constexpr int kHypotheses = 24;
+
+/// What share of a frame's readings has a say.
+double mean_weight(const WeightedPoints& points) {
+  const double sum = std::accumulate(points.weight.begin(), points.weight.end(), 0.0);
+  return std::max(1e-3, sum / static_cast<double>(points.size()));
+}
 }  // namespace
 
 PoseFilter::PoseFilter(const FilterConfig& config, const MotionModelConfig& motion, const SteadyErrorsConfig& errors,
                        std::uint64_t seed)
-    : config_(config), motion_(motion), seed_(seed), odometry_errors_(errors, seed) {
+    : config_(config), motion_(motion), seed_(seed), odometry_errors_(errors) {
   particles_.resize(static_cast<std::size_t>(config.particles));
-  odometry_errors_.draw(particles_.size(), step_++);
+  odometry_errors_.forget(particles_.size());
   ancestor_.resize(particles_.size());
   start_at(Pose2{}, 0.0);
 }
@@ -35,8 +42,12 @@ void PoseFilter::start_at(const Pose2& pose, double stamp_s) {
 }
 
 void PoseFilter::predict(const Pose2& T_before_after) {
-  sample_motion(motion_, T_before_after, seed_, random_stream::kMotion, step_, particles_);
-  odometry_errors_.apply(T_before_after, step_++, &particles_);
+  if (!odometry_errors_.on()) {
+    sample_motion(motion_, T_before_after, seed_, random_stream::kMotion, step_++, particles_);
+    return;
+  }
+  odometry_errors_.move(T_before_after, motion_noise(motion_, T_before_after), seed_, step_, &particles_);
+  step_ += 2;
 }
 
 void PoseFilter::shift(const Pose2& T_before_after) {
@@ -52,6 +63,12 @@ void PoseFilter::estimate_from_particles() {
   mean_cost_ = std::numeric_limits<double>::quiet_NaN();
 }
 
+double PoseFilter::temperature() const {
+  if (config_.misfit_cost <= 0.0) return config_.temperature;
+  const float best = *std::min_element(cost_.begin(), cost_.end());
+  return config_.temperature * (1.0 + static_cast<double>(best) / config_.misfit_cost);
+}
+
 void PoseFilter::weigh(const TsdfGrid& grid, const WeightedPoints& points, double share) {
   if (config_.alignment_cost == "paper") {
     float mean_weight = 0.0f;
@@ -64,7 +81,7 @@ void PoseFilter::weigh(const TsdfGrid& grid, const WeightedPoints& points, doubl
     }
   } else {
     tsdf_alignment_costs(grid, points, particles_, static_cast<float>(config_.unknown_price), &cost_);
-    weigh_by_cost(particles_, cost_, config_.temperature / share);
+    weigh_by_cost(particles_, cost_, temperature() / share);
   }
 }
 
@@ -101,6 +118,7 @@ void PoseFilter::jitter(const Pose2& center, const Eigen::Matrix3d& covariance, 
 void PoseFilter::update(const TsdfGrid& grid, WeightedPoints* readings, double stamp_s, double evidence) {
   if (config_.alignment_cost == "normalized") weigh_by_known_share(grid, particles_, kHypotheses, readings);
   const WeightedPoints& points = *readings;
+  evidence *= mean_weight(points);
   // Annealing: the likelihood enters in shares that sum to 1, the last and largest on the finest samples.
   double total = 0.0, share = 1.0;
   for (int r = 0; r <= config_.refinements; ++r, share *= 3.0) total += share;

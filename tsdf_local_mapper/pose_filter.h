@@ -42,6 +42,7 @@ class PoseFilter {
 
  private:
   void weigh(const TsdfGrid& grid, const WeightedPoints& points, double share);
+  double temperature() const;
   void jitter(const Pose2& center, const Eigen::Matrix3d& covariance, double width);
   void resample();
   void track_ancestors(double stamp_s);

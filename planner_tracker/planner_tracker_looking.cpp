@@ -1,0 +1,57 @@
+// Standing before a way that is closed for now: where the robot looks at it from.
+#include <algorithm>
+#include <cmath>
+
+#include "planner_tracker/planner_tracker_state.h"
+
+namespace knav {
+namespace {
+
+constexpr double kArrived_m = 0.15;
+constexpr double kFacing_rad = 0.2;
+constexpr double kStandsBefore_m = 0.8;    ///< what closes the way, and the robot's radius, reach this far before the point
+constexpr double kTooNear = 0.75;          ///< of look_distance_m
+constexpr double kEnoughFarther_m = 0.15;  ///< less is not worth backing up for
+constexpr double kFreeBehind_m = 0.25;
+
+}  // namespace
+
+bool PlannerTracker::State::looking(double now_s, const RobotState& robot) {
+  const Path& path = keeper.path();
+  const Point2 p = robot.T_map_base.inverse() * keeper.at();
+  const double distance = std::hypot(p.x_m, p.y_m), bearing = std::atan2(p.y_m, p.x_m);
+  const double wanted = config.planning.look_distance_m;
+  const bool closed = outcome == PlanKeeper::Outcome::kToBlockage;
+  const bool arrived = path.remaining_m() + path.offset_m() < kArrived_m;
+  const bool in_view = closed && distance < wanted + kArrived_m &&
+                       tracker.straight_free_m(input, bearing, distance) > distance - kStandsBefore_m;
+  if (in_view && backing_up(now_s, robot, keeper.at())) return true;
+  if (!arrived && (!in_view || distance < kTooNear * wanted)) return false;
+  if (looking_since_s < 0.0) looking_since_s = now_s;
+  act(Activity::kWaiting, std::abs(bearing) > kFacing_rad ? tracker.turn(input, bearing) : tracker.stop(input));
+  return true;
+}
+
+/// Something stands nearer than a level Kinect sees the floor: whether it goes, cannot be seen from here, and in a door
+/// nobody gets past the robot. Backs up with its eyes on it.
+bool PlannerTracker::State::backing_up(double now_s, const RobotState& robot, const Point2& from) {
+  const Point2 p = robot.T_map_base.inverse() * from;
+  const double missing_m = config.planning.look_distance_m - std::hypot(p.x_m, p.y_m);
+  const bool facing = std::abs(std::atan2(p.y_m, p.x_m)) < 2.0 * kFacing_rad;
+  const bool moving = input.v_mps < -0.01;
+  if (config.planning.back_up_after_s <= 0.0 || config.min_vel_x >= 0.0 || !facing ||
+      missing_m < (moving ? 0.03 : kEnoughFarther_m)) {
+    near_since_s = -1.0;
+    return false;
+  }
+  if (near_since_s < 0.0) near_since_s = now_s;
+  if (now_s - near_since_s < config.planning.back_up_after_s) return false;
+  const double behind_m = scan.free_m(kPi, tracker.stop_radius_m(), true);
+  if (behind_m < (moving ? 0.1 : kFreeBehind_m)) return false;
+  const TrackOutput back = tracker.creep(input, -std::min(missing_m, behind_m - 0.05));
+  if (back.kind == TrackOutput::Kind::kBlocked) return false;
+  act(Activity::kBackingUp, back);
+  return true;
+}
+
+}  // namespace knav
