@@ -53,8 +53,8 @@ struct PlanningConfig {
     v.number("look_distance_m", look_distance_m, 0.3, 5, "m",
              "A closed way is looked at from this far: nearer, a level Kinect does not see whether it is free again.");
     v.number("back_up_after_s", back_up_after_s, 0, 60, "s",
-             "Standing this long before something nearer than that, the robot backs up to that distance, where it is known "
-             "to be free behind: it sees more, and whoever wants to pass can; 0 = never.");
+             "Standing this long before something nearer than that, the robot backs up to that distance, over ground it has "
+             "just driven and where nothing is in the scan: it sees more, and whoever wants to pass can; 0 = never.");
     v.number("slowness", slowness, 1, 100, "",
              "The goal fails after 60 s plus this many times what its first plan takes at full speed.");
     v.number("goal_snap_m", goal_snap_m, 0, 5, "m",

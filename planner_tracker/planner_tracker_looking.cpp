@@ -13,6 +13,7 @@ constexpr double kStandsBefore_m = 0.8;    ///< what closes the way, and the rob
 constexpr double kTooNear = 0.75;          ///< of look_distance_m
 constexpr double kEnoughFarther_m = 0.15;  ///< less is not worth backing up for
 constexpr double kFreeBehind_m = 0.25;
+constexpr double kJustDriven_s = 12.0, kBesideTrack_m = 0.1;
 
 }  // namespace
 
@@ -32,6 +33,21 @@ bool PlannerTracker::State::looking(double now_s, const RobotState& robot) {
   return true;
 }
 
+/// How far straight behind it the robot came along within the last seconds: seen free, and driven.
+double PlannerTracker::State::just_driven_behind_m(const Pose2& T_odom_base) const {
+  double driven_m = 0.0;
+  if (odometry.empty()) return driven_m;
+  const double newest_s = odometry.newest_s();
+  for (double stamp_s = newest_s; stamp_s > newest_s - kJustDriven_s; stamp_s -= 0.1) {
+    Pose2 T_odom_then;
+    if (odometry.at(stamp_s, 1.0, 0.0, &T_odom_then) != PoseBuffer::Lookup::kOk) break;
+    const Pose2 then = T_odom_base.inverse() * T_odom_then;
+    if (std::abs(then.y_m) > kBesideTrack_m) break;
+    driven_m = std::max(driven_m, -then.x_m);
+  }
+  return driven_m;
+}
+
 /// Something stands nearer than a level Kinect sees the floor: whether it goes, cannot be seen from here, and in a door
 /// nobody gets past the robot. Backs up with its eyes on it.
 bool PlannerTracker::State::backing_up(double now_s, const RobotState& robot, const Point2& from) {
@@ -44,10 +60,14 @@ bool PlannerTracker::State::backing_up(double now_s, const RobotState& robot, co
     near_since_s = -1.0;
     return false;
   }
-  if (near_since_s < 0.0) near_since_s = now_s;
-  if (now_s - near_since_s < config.planning.back_up_after_s) return false;
-  const double behind_m = scan.free_m(kPi, tracker.stop_radius_m(), true);
+  const double behind_m =
+      std::min(scan.free_m(kPi, tracker.stop_radius_m(), false), just_driven_behind_m(robot.T_odom_base));
   if (behind_m < (moving ? 0.1 : kFreeBehind_m)) return false;
+  if (near_since_s < 0.0) near_since_s = now_s;
+  if (now_s - near_since_s < config.planning.back_up_after_s) {
+    act(Activity::kWaiting, tracker.stop(input));
+    return true;
+  }
   const TrackOutput back = tracker.creep(input, -std::min(missing_m, behind_m - 0.05));
   if (back.kind == TrackOutput::Kind::kBlocked) return false;
   act(Activity::kBackingUp, back);

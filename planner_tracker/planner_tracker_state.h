@@ -47,6 +47,7 @@ struct PlannerTracker::State {
   bool looking(double now_s, const RobotState& robot);
   bool backing_up(double now_s, const RobotState& robot, const Point2& from);
 
+  double just_driven_behind_m(const Pose2& T_odom_base) const;
   void act(Activity activity, const TrackOutput& output);
   /// Ends the goal as failed.
   void fail(FailureCode code, const Point2& at, std::string reason);
@@ -61,7 +62,7 @@ struct PlannerTracker::State {
   PathTracker tracker;
   RandomMoves moves;
   ScanView scan;
-  PoseBuffer odometry{512};
+  PoseBuffer odometry{1024};
   Freshness scan_fresh, odometry_fresh, pose_fresh;
   GoalWatch watch;
 

@@ -190,7 +190,7 @@ class ToyWorld {
           hits.push_back(g.index(ix, iy));
           break;
         }
-        memory_.value[g.index(ix, iy)] = 0;
+        if (r >= sees_free_from_m) memory_.value[g.index(ix, iy)] = 0;
       }
     }
     for (const std::size_t i : hits) memory_.value[i] = 100;
@@ -249,6 +249,7 @@ class ToyWorld {
   std::vector<Disc> discs;
   bool sensor_alive = true;
   double memory_range_m = 8.0;
+  double sees_free_from_m = 0.0;  ///< nearer than this, what was seen occupied stays so
   double pose_noise_m = 0.005;
   double now_s = 100.0, v_mps = 0.0, w_radps = 0.0;
 

@@ -1,0 +1,87 @@
+// A way that is closed for now: from where the robot looks at it, and that it does not stay where it cannot see.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "planner_tracker/plan_keeper.h"
+#include "planner_tracker/planner_tracker.h"
+#include "toy_world.h"
+
+namespace knav {
+namespace {
+
+/// Two rooms of 6 x 6 m side by side, joined by one door of 0.9 m.
+OccupancyGrid two_rooms(bool open) {
+  OccupancyGrid grid = room(12.0, 6.0);
+  fill(&grid, 5.95, 0.0, 6.05, 6.0, 100);
+  if (open) fill(&grid, 5.95, 2.5, 6.05, 3.4, 0);
+  return grid;
+}
+
+/// Where the way ends that the keeper makes of a door found shut.
+Point2 end_of_way(const Point2& robot, Point2* closed_at) {
+  const PlannerTrackerConfig config;
+  CombinedMap map(config.preferred_radius_m() + 0.2, config.clearance.occupied_threshold, config.clearance.free_threshold);
+  map.set_global({}, two_rooms(true), {});
+  map.set_local(two_rooms(false), Pose2{});
+  PlanKeeper keeper(config);
+  keeper.set_map(map);
+  EXPECT_EQ(keeper.replan(map, robot, {10.0, 3.0}), PlanKeeper::Outcome::kToBlockage);
+  *closed_at = keeper.at();
+  return keeper.path().end();
+}
+
+double distance(const Point2& a, const Point2& b) { return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m); }
+
+TEST(ClosedWay, IsLookedAtFromAfar) {
+  Point2 at;
+  const Point2 end = end_of_way({1.5, 3.0}, &at);
+  EXPECT_NEAR(at.x_m, 5.7, 0.15);  // the wall's face less the robot's radius and 5 cm
+  EXPECT_NEAR(distance(end, at), PlannerTrackerConfig{}.planning.look_distance_m, 0.1);
+}
+
+TEST(ClosedWay, IsLeftAloneByARobotThatStandsTooNear) {
+  Point2 at;
+  const Point2 end = end_of_way({5.3, 3.0}, &at);
+  EXPECT_GT(distance(end, at), 0.9 * PlannerTrackerConfig{}.planning.look_distance_m);
+  EXPECT_LT(distance(end, at), 1.5 * PlannerTrackerConfig{}.planning.look_distance_m);
+  EXPECT_LT(end.x_m, 5.6) << "on this side of the door";
+}
+
+TEST(ClosedWay, TheRobotBacksUpFromSomebodyWithItsEyesOnHimUntilHeIsGone) {
+  const OccupancyGrid grid = room(10.0, 1.2);
+  ToyWorld world(grid, grid, {1.0, 0.6, 0.0});
+  world.sees_free_from_m = 1.3;  // as a level Kinect does, which does not see the floor nearer than that
+  const double comes_s = world.now_s + 5.0, leaves_s = comes_s + 4.0;
+  Point2 stands{-5.0, 0.6};
+  world.discs.push_back({[&](double t) {
+    if (t < comes_s || t > leaves_s) return Point2{-5.0, 0.6};
+    if (stands.x_m < 0.0) stands.x_m = world.T_map_base.x_m + 0.9;
+    return stands;
+  }});
+  world.planner.set_goal({9.0, 0.6, 0.0});
+  Command command;
+  double turned_rad = 0.0;
+  for (int i = 0; i < 1200 && !command.finished; ++i) {
+    command = world.step();
+    turned_rad = std::max(turned_rad, std::abs(world.T_map_base.yaw_rad));
+  }
+  EXPECT_EQ(command.activity, Activity::kReached) << world.planner.failure().reason;
+  EXPECT_LT(turned_rad, 0.8);
+  EXPECT_EQ(world.avoidances, 0);
+  EXPECT_EQ(world.collisions, 0);
+  EXPECT_LE(world.reversals, 2) << "back once, and on";
+}
+
+TEST(ClosedWay, BacksUpOnlyOverGroundItHasJustDriven) {
+  // It was set down here.
+  const OccupancyGrid grid = room(10.0, 1.2);
+  ToyWorld world(grid, grid, {3.0, 0.6, 0.0});
+  world.sees_free_from_m = 1.3;
+  world.discs.push_back({[](double) { return Point2{3.9, 0.6}; }});
+  world.planner.set_goal({9.0, 0.6, 0.0});
+  for (int i = 0; i < 60; ++i) EXPECT_GE(world.step().v_mps, 0.0);
+}
+
+}  // namespace
+}  // namespace knav
