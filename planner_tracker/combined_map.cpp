@@ -27,11 +27,12 @@ int MapLayer::squared_for(double clearance_m) const {
   return std::max(1, static_cast<int>(std::ceil(cells * cells - 1e-9)));
 }
 
-CombinedMap::CombinedMap(double reach_m, int occupied_threshold, int free_threshold)
+CombinedMap::CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s)
     : reach_m_(reach_m),
       occupied_threshold_(occupied_threshold),
       free_threshold_(free_threshold),
-      distance_(1) {}
+      distance_(1),
+      memory_s_(memory_s) {}
 
 CellState CombinedMap::local_state(std::int8_t value) const {
   if (value < 0) return CellState::kUnknown;
@@ -80,10 +81,12 @@ void CombinedMap::set_global(const DistanceMap& distance, const OccupancyGrid& o
   combined_ = global_;
   local_window_ = {};
   local_cells_.clear();
+  remembered_.clear();
+  is_remembered_.assign(cells, 0);
   changed_cells_ = cells;
 }
 
-void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local) {
+void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local, double now_s) {
   if (empty() || local.value.size() != local.geometry.cell_count() || !is_finite(T_map_local)) return;
   const GridGeometry& g = global_.geometry;
   const GridGeometry& l = local.geometry;
@@ -109,6 +112,9 @@ void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local
   }
   const CellWindow old_window = local_window_;
   local_window_ = window.empty() ? CellWindow{} : window;
+  T_local_map_ = T_map_local.inverse();
+  local_geometry_ = l;
+  now_s_ = now_s;
   if (!window.empty()) sample_local(local, T_map_local, window);
   apply(old_window.united(local_window_));
 }
@@ -116,6 +122,8 @@ void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local
 void CombinedMap::clear_local() {
   const CellWindow old_window = local_window_;
   local_window_ = {};
+  // All of the map is on an endless local map that shows nothing: nothing is remembered.
+  local_geometry_ = {};
   apply(old_window);
 }
 
@@ -158,25 +166,64 @@ void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_lo
   }
 }
 
+bool CombinedMap::on_local(int ix, int iy) const {
+  if (local_geometry_.width_cells == 0) return true;
+  const Point2 p = T_local_map_ * Point2{global_.geometry.center_x_m(ix), global_.geometry.center_y_m(iy)};
+  return local_geometry_.contains(local_geometry_.cell_x(p.x_m), local_geometry_.cell_y(p.y_m));
+}
+
+/// What the local map shows of a cell, or showed before the cell went off its edge.
+CellState CombinedMap::held(int ix, int iy) const {
+  const CellWindow& w = local_window_;
+  CellState local = CellState::kUnknown;
+  if (!w.empty() && ix >= w.x0 && ix < w.x1 && iy >= w.y0 && iy < w.y1) {
+    local = local_cells_[static_cast<std::size_t>(iy - w.y0) * static_cast<std::size_t>(w.width()) +
+                         static_cast<std::size_t>(ix - w.x0)];
+  }
+  const std::size_t i = global_.geometry.index(ix, iy);
+  const bool showed = combined_.state[i] == CellState::kOccupied && global_.state[i] != CellState::kOccupied;
+  return memory_s_ > 0.0 && showed && local == CellState::kUnknown && !on_local(ix, iy) ? CellState::kOccupied : local;
+}
+
+void CombinedMap::put(int ix, int iy, CellState now, CellWindow* dirty) {
+  const std::size_t i = global_.geometry.index(ix, iy);
+  if (now == combined_.state[i]) return;
+  // Only a change between open and not open moves clearances.
+  if ((now == CellState::kFree) != (combined_.state[i] == CellState::kFree)) dirty->include(ix, iy);
+  combined_.state[i] = now;
+  ++changed_cells_;
+}
+
+/// What has been off the edge for too long is forgotten, and what is on the local map again is the local map's to say.
+void CombinedMap::forget(CellWindow* dirty) {
+  std::size_t kept = 0;
+  for (const Remembered& r : remembered_) {
+    if (now_s_ < r.until_s && now_s_ >= r.until_s - memory_s_ && !on_local(r.ix, r.iy)) {
+      remembered_[kept++] = r;
+      continue;
+    }
+    const std::size_t i = global_.geometry.index(r.ix, r.iy);
+    is_remembered_[i] = 0;
+    put(r.ix, r.iy, global_.state[i], dirty);
+  }
+  remembered_.resize(kept);
+}
+
 void CombinedMap::apply(const CellWindow& window) {
   changed_cells_ = 0;
   CellWindow dirty;
-  const CellWindow& lw = local_window_;
+  forget(&dirty);
   for (int iy = window.y0; iy < window.y1; ++iy) {
-    const bool local_row = !lw.empty() && iy >= lw.y0 && iy < lw.y1;
     for (int ix = window.x0; ix < window.x1; ++ix) {
-      CellState local = CellState::kUnknown;
-      if (local_row && ix >= lw.x0 && ix < lw.x1) {
-        local = local_cells_[static_cast<std::size_t>(iy - lw.y0) * static_cast<std::size_t>(lw.width()) +
-                             static_cast<std::size_t>(ix - lw.x0)];
-      }
       const std::size_t i = global_.geometry.index(ix, iy);
-      const CellState now = overlay(global_.state[i], local);
-      if (now == combined_.state[i]) continue;
-      // Only a change between open and not open moves clearances.
-      if ((now == CellState::kFree) != (combined_.state[i] == CellState::kFree)) dirty.include(ix, iy);
-      combined_.state[i] = now;
-      ++changed_cells_;
+      if (is_remembered_[i] != 0) continue;
+      const CellState local = held(ix, iy);
+      put(ix, iy, overlay(global_.state[i], local), &dirty);
+      if (memory_s_ > 0.0 && local == CellState::kOccupied && combined_.state[i] == CellState::kOccupied &&
+          global_.state[i] != CellState::kOccupied && !on_local(ix, iy)) {
+        is_remembered_[i] = 1;
+        remembered_.push_back({ix, iy, now_s_ + memory_s_});
+      }
     }
   }
   if (dirty.empty()) return;

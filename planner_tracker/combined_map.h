@@ -49,14 +49,16 @@ struct MapLayer {
 class CombinedMap {
  public:
   /// @param reach_m clearances are exact up to this
-  CombinedMap(double reach_m, int occupied_threshold, int free_threshold);
+  /// @param memory_s  how long what the local map showed occupied stays so once it is off its edge. Without it a way closed
+  /// at the edge is closed and open by turns as the robot turns away from it and back.
+  CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s = 0.0);
 
   /// @param occupancy may be empty if `distance` is not, and the other way round; @param keepout may be
   /// empty. Both given: a cell is free only if both say so. Throws UserError if both are empty or sizes do
   /// not fit.
   void set_global(const DistanceMap& distance, const OccupancyGrid& occupancy, const OccupancyGrid& keepout);
   /// Replaces the previous local map. Clearances are recomputed round the cells that changed.
-  void set_local(const OccupancyGrid& local, const Pose2& T_map_local);
+  void set_local(const OccupancyGrid& local, const Pose2& T_map_local, double now_s = 0.0);
   void clear_local();
 
   bool empty() const { return global_.state.empty(); }
@@ -69,6 +71,10 @@ class CombinedMap {
   CellState local_state(std::int8_t value) const;
   void sample_local(const OccupancyGrid& local, const Pose2& T_map_local, const CellWindow& window);
   void apply(const CellWindow& window);
+  bool on_local(int ix, int iy) const;
+  CellState held(int ix, int iy) const;
+  void put(int ix, int iy, CellState now, CellWindow* dirty);
+  void forget(CellWindow* dirty);
 
   double reach_m_;
   int occupied_threshold_, free_threshold_;
@@ -76,6 +82,15 @@ class CombinedMap {
   TruncatedDistance distance_;
   CellWindow local_window_;             ///< of the last local map
   std::vector<CellState> local_cells_;  ///< of `local_window_`, row-major
+  struct Remembered {
+    int ix, iy;
+    double until_s;
+  };
+  double memory_s_, now_s_ = 0.0;
+  std::vector<Remembered> remembered_;  ///< occupied cells off the local map's edge
+  std::vector<std::uint8_t> is_remembered_;
+  Pose2 T_local_map_;  ///< of the last local map
+  GridGeometry local_geometry_{};
   std::size_t changed_cells_ = 0;
 };
 

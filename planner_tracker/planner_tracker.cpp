@@ -53,7 +53,7 @@ const char* to_string(Activity activity) {
 PlannerTracker::State::State(const PlannerTrackerConfig& c)
     : config(c),
       map(c.preferred_radius_m() + kBeyondPreferred_m, c.clearance.occupied_threshold,
-          c.clearance.free_threshold),
+          c.clearance.free_threshold, c.planning.closed_memory_s),
       keeper(c),
       tracker(c),
       moves(c, tracker),
@@ -74,7 +74,7 @@ void PlannerTracker::set_map(const DistanceMap& distance, const OccupancyGrid& o
 }
 
 void PlannerTracker::set_local_map(const OccupancyGrid& local, const Pose2& T_map_local) {
-  state_->map.set_local(local, T_map_local);
+  state_->map.set_local(local, T_map_local, state_->last_step_s);
 }
 
 void PlannerTracker::clear_local_map() {

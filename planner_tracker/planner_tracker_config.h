@@ -37,6 +37,7 @@ struct PlanningConfig {
   double blocked_timeout_s = 40.0;
   double look_distance_m = 1.8;
   double back_up_after_s = 1.5;
+  double closed_memory_s = 120.0;
   double slowness = 5.0;
   double goal_snap_m = 1.5;
 
@@ -55,6 +56,9 @@ struct PlanningConfig {
     v.number("back_up_after_s", back_up_after_s, 0, 60, "s",
              "Standing this long before something nearer than that, the robot backs up to that distance, over ground it has "
              "just driven and where nothing is in the scan: it sees more, and whoever wants to pass can; 0 = never.");
+    v.number("closed_memory_s", closed_memory_s, 0, 3600, "s",
+             "What the local map showed occupied stays so for this long once it is off its edge, so that the robot does not "
+             "turn to and fro between a way found closed and another.");
     v.number("slowness", slowness, 1, 100, "",
              "The goal fails after 60 s plus this many times what its first plan takes at full speed.");
     v.number("goal_snap_m", goal_snap_m, 0, 5, "m",

@@ -58,6 +58,7 @@ void make_paper(LocalMapperConfig* config) {
   config->filter.alignment_cost = "paper";
   config->filter.misfit_cost = config->filter.depth_trust_m = 0.0;
   config->odometry_errors.memory_m = 0.0;
+  config->motion.translation_per_translation = 0.1;
   config->motion.translation_per_rotation = 0.05;
   config->motion.rotation_per_rotation = 0.35;
   config->motion.sideways_per_translation = 0.05;

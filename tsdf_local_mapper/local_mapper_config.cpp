@@ -5,7 +5,7 @@
 namespace knav {
 
 LocalMapperConfig::LocalMapperConfig() {
-  motion.translation_per_translation = 0.1;
+  motion.translation_per_translation = 0.05;
   motion.translation_per_rotation = 0.03;
   motion.rotation_per_translation = 0.25;
   motion.rotation_per_rotation = 0.2;

@@ -19,7 +19,11 @@ std::vector<int> record(const std::string& path, std::size_t frames) {
   std::vector<int> indices;
   auto runtime = knav::OpenNIRuntime::acquire();
   openni::Device device;
-  EXPECT_EQ(device.open(openni::ANY_DEVICE), openni::STATUS_OK) << openni::OpenNI::getExtendedError();
+  // The plugin tells the runtime of its device from a thread of its own.
+  if (!knav::wait_until([&] { return device.open(openni::ANY_DEVICE) == openni::STATUS_OK; })) {
+    ADD_FAILURE() << openni::OpenNI::getExtendedError();
+    return indices;
+  }
   openni::VideoStream depth;
   EXPECT_EQ(depth.create(device, openni::SENSOR_DEPTH), openni::STATUS_OK);
   openni::Recorder recorder;

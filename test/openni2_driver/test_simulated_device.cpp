@@ -150,8 +150,10 @@ TEST(SimulatedDevice, AKilledSimulatorCountsAsUnpluggedAndItsNameIsFree) {
       usleep(10000);
     }
   }
+  ASSERT_GT(child, 0);
+  close(ready[1]);  // so that reading ends should the child end
   char told = 0;
-  ASSERT_EQ(read(ready[0], &told, 1), 1);
+  ASSERT_EQ(read(ready[0], &told, 1), 1) << "the child could not show a camera";
   EXPECT_THROW(SharedCameraWriter(name, info_of()), knav::UserError) << "two simulators show one device";
   WatchedDevice watched(config_of(name));
   ASSERT_TRUE(watched.reaches(DeviceState::kIdle));
@@ -161,7 +163,6 @@ TEST(SimulatedDevice, AKilledSimulatorCountsAsUnpluggedAndItsNameIsFree) {
   EXPECT_TRUE(watched.reaches(DeviceState::kSearching, 5.0)) << "a dead simulator's device is still there";
   EXPECT_NO_THROW(SharedCameraWriter(name, info_of()));
   close(ready[0]);
-  close(ready[1]);
 }
 
 TEST(SimulatedDevice, ReconfiguringTakesEffectWhileItRuns) {

@@ -72,13 +72,62 @@ TEST(Overlay, ALocalWallTurnedBy30DegreesHasNoHoles) {
   }
 }
 
+/// A corridor of 30 m, with a local map of 10 m whose cell at (12, 1) is occupied while `closed`.
+struct Corridor {
+  explicit Corridor(double memory_s) : map(0.5, 65, 25, memory_s) { map.set_global({}, room(30.0, 2.0), {}); }
+  void look_from(double x_m, bool closed, double now_s) {
+    OccupancyGrid local;
+    local.geometry = {200, 40, 0.05, -5.0, -1.0};
+    local.value.assign(local.geometry.cell_count(), 0);
+    const int ix = local.geometry.cell_x(12.0 - x_m), iy = local.geometry.cell_y(0.0);
+    if (closed && local.geometry.contains(ix, iy)) local.value[local.geometry.index(ix, iy)] = 100;
+    map.set_local(local, {x_m, 1.0, 0.0}, now_s);
+  }
+  bool closed() const { return map.combined().clearance_m(12.0, 1.0) < 0.1; }
+  CombinedMap map;
+};
+
+TEST(Overlay, WhatWasClosedStaysSoOffTheLocalMapsEdge) {
+  Corridor corridor(60.0);
+  corridor.look_from(8.0, true, 100.0);
+  EXPECT_TRUE(corridor.closed());
+  corridor.look_from(6.0, false, 101.0);  // 12 m is 6 m away now: off the edge
+  EXPECT_TRUE(corridor.closed());
+  corridor.look_from(4.0, false, 150.0);
+  EXPECT_TRUE(corridor.closed());
+  corridor.look_from(4.0, false, 162.0);
+  EXPECT_FALSE(corridor.closed()) << "it has been off the edge for 60 s";
+}
+
+TEST(Overlay, WhatIsOnTheLocalMapAgainIsTheLocalMapsToSay) {
+  Corridor corridor(60.0);
+  corridor.look_from(8.0, true, 100.0);
+  corridor.look_from(6.0, false, 101.0);
+  corridor.look_from(8.0, false, 102.0);
+  EXPECT_FALSE(corridor.closed());
+  corridor.look_from(6.0, false, 103.0);
+  EXPECT_FALSE(corridor.closed());
+}
+
+TEST(Overlay, ClearingForgetsWhatWasRememberedAndWithoutMemoryNothingIs) {
+  Corridor corridor(60.0), forgetful(0.0);
+  for (Corridor* c : {&corridor, &forgetful}) {
+    c->look_from(8.0, true, 100.0);
+    c->look_from(6.0, false, 101.0);
+  }
+  EXPECT_FALSE(forgetful.closed());
+  EXPECT_TRUE(corridor.closed());
+  corridor.map.clear_local();
+  EXPECT_FALSE(corridor.closed());
+}
+
 TEST(Overlay, IncrementalClearanceEqualsThatOfAFreshMap) {
   RandomStream random(3, random_stream::kTest, 0, 0);
   OccupancyGrid global = room(9.0, 7.0);
   for (auto& v : global.value) {
     if (random.uniform() < 0.01) v = 100;
   }
-  CombinedMap map(0.7, 65, 25);
+  CombinedMap map(0.7, 65, 25, 3.0);
   map.set_global({}, global, {});
   for (int round = 0; round < 12; ++round) {
     OccupancyGrid local;
@@ -87,7 +136,7 @@ TEST(Overlay, IncrementalClearanceEqualsThatOfAFreshMap) {
       const double u = random.uniform();
       local.value.push_back(static_cast<std::int8_t>(u < 0.5 ? -1 : u < 0.97 ? 0 : 100));
     }
-    map.set_local(local, {random.uniform(-1.0, 10.0), random.uniform(-1.0, 8.0), random.uniform(-3.0, 3.0)});
+    map.set_local(local, {random.uniform(-1.0, 10.0), random.uniform(-1.0, 8.0), random.uniform(-3.0, 3.0)}, round);
     std::vector<std::uint8_t> blocked;
     for (const CellState s : map.combined().state) blocked.push_back(s != CellState::kFree);
     // Independent: core's transform of the whole grid, in a frame of blocked cells.
