@@ -1,7 +1,9 @@
 #include "openni2_driver/openni_runtime.h"
 
 #include <OpenNI.h>
+#include <dlfcn.h>
 #include <fmt/format.h>
+#include <link.h>
 #include <sys/stat.h>
 
 #include <array>
@@ -23,6 +25,25 @@ std::string extended_error() {
   return text;
 }
 
+/// Tells our plugins that the runtime is about to shut down, see driver_gate.h. They are loaded by the runtime, privately, so
+/// they are looked for among what this process has loaded.
+void rest_drivers() {
+  std::vector<std::string> paths;
+  dl_iterate_phdr(
+      [](dl_phdr_info* info, std::size_t, void* found) {
+        const std::string path = info->dlpi_name == nullptr ? "" : info->dlpi_name;
+        if (path.find("/libKinectNav") != std::string::npos) static_cast<std::vector<std::string>*>(found)->push_back(path);
+        return 0;
+      },
+      &paths);
+  for (const std::string& path : paths) {
+    void* plugin = dlopen(path.c_str(), RTLD_NOW | RTLD_NOLOAD);
+    if (plugin == nullptr) continue;
+    if (void* rest = dlsym(plugin, "kinect_nav_driver_rest")) reinterpret_cast<void (*)()>(rest)();
+    dlclose(plugin);
+  }
+}
+
 class Runtime final : public OpenNIRuntime,
                       public openni::OpenNI::DeviceDisconnectedListener,
                       public openni::OpenNI::DeviceStateChangedListener {
@@ -40,6 +61,7 @@ class Runtime final : public OpenNIRuntime,
     openni::OpenNI::addDeviceStateChangedListener(this);
   }
   ~Runtime() override {
+    rest_drivers();
     openni::OpenNI::removeDeviceStateChangedListener(this);
     openni::OpenNI::removeDeviceDisconnectedListener(this);
     openni::OpenNI::shutdown();

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 
+#include "openni2_driver/driver_gate.h"
 #include "openni2_driver/kinect_v1/kinect_v1_device.h"
 
 namespace knav {
@@ -18,6 +19,7 @@ class KinectV1Driver final : public oni::driver::DriverBase {
                        oni::driver::DeviceDisconnectedCallback disconnected,
                        oni::driver::DeviceStateChangedCallback state_changed, void* cookie) override {
     DriverBase::initialize(connected, disconnected, state_changed, cookie);
+    DriverGate::open();
     loop_ = std::make_unique<FreenectLoop>(
         [this](const KinectOnUsb& kinect, bool here) { changed(kinect, here); });
     return ONI_STATUS_OK;
@@ -51,11 +53,13 @@ class KinectV1Driver final : public oni::driver::DriverBase {
       std::lock_guard<std::mutex> lock(mutex_);
       known = &infos_.emplace(kinect.uri, info).first->second;
     }
-    if (here) {
-      deviceConnected(known);
-    } else {
-      deviceDisconnected(known);
-    }
+    DriverGate::tell([&] {
+      if (here) {
+        deviceConnected(known);
+      } else {
+        deviceDisconnected(known);
+      }
+    });
   }
 
   std::mutex mutex_;

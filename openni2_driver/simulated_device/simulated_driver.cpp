@@ -9,6 +9,7 @@
 #include <mutex>
 #include <thread>
 
+#include "openni2_driver/driver_gate.h"
 #include "openni2_driver/simulated_device/simulated_device.h"
 
 namespace knav {
@@ -25,6 +26,7 @@ class SimulatedDriver final : public oni::driver::DriverBase {
                        oni::driver::DeviceDisconnectedCallback disconnected,
                        oni::driver::DeviceStateChangedCallback state_changed, void* cookie) override {
     DriverBase::initialize(connected, disconnected, state_changed, cookie);
+    DriverGate::open();
     look();
     watcher_ = std::thread([this] { watch(); });
     return ONI_STATUS_OK;
@@ -61,7 +63,7 @@ class SimulatedDriver final : public oni::driver::DriverBase {
     for (auto& [name, seen] : seen_) {
       if (!seen.camera || seen.camera->plugged()) continue;
       seen.camera.reset();
-      deviceDisconnected(&seen.info);
+      DriverGate::tell([this, info = &seen.info] { deviceDisconnected(info); });
     }
     for (const std::string& name : shared_camera_names()) {
       Seen& seen = seen_[name];
@@ -71,7 +73,7 @@ class SimulatedDriver final : public oni::driver::DriverBase {
       std::snprintf(seen.info.uri, sizeof(seen.info.uri), "%s%s", kUriPrefix, name.c_str());
       std::snprintf(seen.info.vendor, sizeof(seen.info.vendor), "kinect_nav");
       std::snprintf(seen.info.name, sizeof(seen.info.name), "simulated Kinect");
-      deviceConnected(&seen.info);
+      DriverGate::tell([this, info = &seen.info] { deviceConnected(info); });
     }
   }
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "openni2_driver/driver_gate.h"
 #include "openni2_driver/virtual_device/control_file.h"
 #include "openni2_driver/virtual_device/virtual_device.h"
 
@@ -33,6 +34,7 @@ class VirtualDriver final : public oni::driver::DriverBase {
                        oni::driver::DeviceDisconnectedCallback disconnected,
                        oni::driver::DeviceStateChangedCallback state_changed, void* cookie) override {
     DriverBase::initialize(connected, disconnected, state_changed, cookie);
+    DriverGate::open();
     const std::string count = environment("KINECT_NAV_VIRTUAL_DEVICES");
     const int devices = count.empty() ? 1 : std::clamp(std::atoi(count.c_str()), 0, 8);
     for (int i = 0; i < devices; ++i) {
@@ -80,9 +82,9 @@ class VirtualDriver final : public oni::driver::DriverBase {
       if (control.plugged) slot.cable->plugged_at_us = steady_us();
       slot.cable->plugged = control.plugged;
       if (control.plugged) {
-        deviceConnected(&slot.info);
+        DriverGate::tell([&] { deviceConnected(&slot.info); });
       } else {
-        deviceDisconnected(&slot.info);
+        DriverGate::tell([&] { deviceDisconnected(&slot.info); });
       }
     }
   }

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "openni2_driver/driver_gate.h"
 #include "openni2_driver/simulated_device/shared_camera.h"
 #include "virtual_device_fixture.h"
 
@@ -205,4 +206,27 @@ TEST(SimulatedDevice, IsNeverTakenForTheFirstDevice) {
 TEST(SharedCamera, ANameThatIsAPathIsRefused) {
   EXPECT_THROW(SharedCameraWriter("../evil", info_of()), knav::UserError);
   EXPECT_THROW(SharedCameraWriter("", info_of()), knav::UserError);
+}
+
+TEST(DriverGate, ClosingItWaitsForNewsUnderWayAndStopsWhatComesAfter) {
+  // The runtime's shutdown waits for a plugin's threads with a lock held that their news would take.
+  knav::DriverGate::open();
+  std::atomic<bool> telling{false}, told{false};
+  std::thread watcher([&] {
+    knav::DriverGate::tell([&] {
+      telling = true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      told = true;
+    });
+  });
+  while (!telling) std::this_thread::yield();
+  kinect_nav_driver_rest();
+  EXPECT_TRUE(told);
+  watcher.join();
+  bool late = false;
+  knav::DriverGate::tell([&] { late = true; });
+  EXPECT_FALSE(late);
+  knav::DriverGate::open();
+  knav::DriverGate::tell([&] { late = true; });
+  EXPECT_TRUE(late);
 }
