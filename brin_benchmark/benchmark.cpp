@@ -151,7 +151,8 @@ class ClosedLoop {
 };
 
 /// @param poll  called every simulated second; may throw to stop
-Leg drive_leg(ClosedLoop& loop, const Waypoint& waypoint, const std::function<void()>& poll) {
+Leg drive_leg(ClosedLoop& loop, const Waypoint& waypoint, const std::function<void()>& poll,
+              const std::function<void()>& collided) {
   Leg leg;
   leg.waypoint = waypoint.name;
   const double start_s = loop.now_s(), start_m = loop.simulator().distance_driven_m();
@@ -162,7 +163,9 @@ Leg drive_leg(ClosedLoop& loop, const Waypoint& waypoint, const std::function<vo
     Ticker polling(1.0);
     while (true) {
       if (polling.due(loop.now_s())) poll();
+      const std::uint32_t collisions = loop.simulator().contacts().collisions;
       const Command& command = loop.step();
+      if (loop.simulator().contacts().collisions > collisions) collided();
       if (command.finished) {
         leg.reached = command.activity == Activity::kReached;
         if (!leg.reached) leg.reason = loop.stack().failure().reason;
@@ -258,7 +261,15 @@ RunRecord run_sequence(const BenchmarkSetup& setup, const WorldConfig& changed, 
   const double start_s = loop.now_s();
   for (std::size_t i = 0; i < waypoints.size(); ++i) {
     const double fraction = static_cast<double>(i) / static_cast<double>(waypoints.size());
-    result.legs.push_back(drive_leg(loop, waypoints[i], [&] { progress("run", fraction); }));
+    const auto collided = [&] {
+      const Pose2& T_world_base = loop.simulator().T_world_base();
+      result.collisions_at.push_back({loop.now_s() - start_s, T_world_base.x_m, T_world_base.y_m});
+      if (recorder == nullptr) return;
+      recorder->failure(fmt::format("{}_{}_collision_{}", i + 1, waypoints[i].name, result.collisions_at.size()),
+                        fmt::format("The robot ran into something at ({:.2f}, {:.2f}) m of the world.", T_world_base.x_m,
+                                    T_world_base.y_m));
+    };
+    result.legs.push_back(drive_leg(loop, waypoints[i], [&] { progress("run", fraction); }, collided));
     const Leg& leg = result.legs.back();
     if (leg.reached) continue;
     const Pose2& T_world_base = loop.simulator().T_world_base();

@@ -31,8 +31,11 @@ nlohmann::json to_json(const RunResult& run) {
     }
     legs.push_back(entry);
   }
+  nlohmann::json collisions = nlohmann::json::array();
+  for (const Collision& c : run.collisions_at) collisions.push_back({{"time_s", c.time_s}, {"x_m", c.x_m}, {"y_m", c.y_m}});
   return {{"name", run.name},
           {"collisions", run.collisions},
+          {"collisions_at", collisions},
           {"walker_contacts", run.walker_contacts},
           {"time_s", run.time_s},
           {"distance_m", run.distance_m},
@@ -46,6 +49,9 @@ RunResult run_from_json(const nlohmann::json& json, const std::string& file) {
   try {
     run.name = json.at("name");
     run.collisions = json.at("collisions");
+    for (const auto& c : json.value("collisions_at", nlohmann::json::array())) {
+      run.collisions_at.push_back({c.at("time_s"), c.at("x_m"), c.at("y_m")});
+    }
     run.walker_contacts = json.at("walker_contacts");
     run.time_s = json.at("time_s");
     run.distance_m = json.at("distance_m");

@@ -16,11 +16,18 @@ struct Leg {
   std::string reason;                ///< of failures
 };
 
+/// Where and when the robot ran into something.
+struct Collision {
+  double time_s = 0.0;  ///< since the run began
+  double x_m = 0.0, y_m = 0.0;  ///< of the robot, in the world
+};
+
 /// A run through the sequence.
 struct RunResult {
   std::string name;
   std::vector<Leg> legs;
   std::uint32_t collisions = 0, walker_contacts = 0;
+  std::vector<Collision> collisions_at;
   double time_s = 0.0, distance_m = 0.0;
   double wall_s = 0.0;         ///< what it cost
   double frame_cost_ms = 0.0;  ///< of the robot's own work, a frame

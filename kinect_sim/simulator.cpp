@@ -137,7 +137,8 @@ void Simulator::step() {
   const Pose2 before = robot_.T_world_base();
   const Pose2 wanted = robot_.wanted_pose(config_.step_s, steps_);
   const double gap_before = gap_m(before), gap_after = gap_m(wanted);
-  const bool blocked = gap_after < 0.0 && gap_after <= gap_before;
+  // A robot that stands, or turns on the spot, runs into nobody, whoever stands against it.
+  const bool blocked = gap_after < 0.0 && gap_after < gap_before;
   if (blocked) {
     robot_.stay();
     if (!contacts_.touching) ++contacts_.collisions;

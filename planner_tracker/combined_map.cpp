@@ -166,6 +166,21 @@ void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_lo
   }
 }
 
+const MapLayer& CombinedMap::permissive() {
+  permissive_.geometry = global_.geometry;
+  permissive_.reach_cells = global_.reach_cells;
+  permissive_.state.resize(global_.state.size());
+  permissive_.squared_cells.resize(global_.state.size());
+  for (std::size_t i = 0; i < global_.state.size(); ++i) {
+    const bool newly_free = global_.state[i] == CellState::kUnknown && combined_.state[i] == CellState::kFree;
+    permissive_.state[i] = newly_free ? CellState::kFree : global_.state[i];
+  }
+  const GridGeometry& g = global_.geometry;
+  distance_.update(g.width_cells, g.height_cells, bytes(permissive_.state), kOpen, {0, 0, g.width_cells, g.height_cells},
+                   permissive_.squared_cells.data());
+  return permissive_;
+}
+
 bool CombinedMap::on_local(int ix, int iy) const {
   if (local_geometry_.width_cells == 0) return true;
   const Point2 p = T_local_map_ * Point2{global_.geometry.center_x_m(ix), global_.geometry.center_y_m(iy)};

@@ -64,6 +64,9 @@ class CombinedMap {
   bool empty() const { return global_.state.empty(); }
   const MapLayer& global() const { return global_; }  ///< with keepout, without local map
   const MapLayer& combined() const { return combined_; }
+  /// What would be open if all that the local map closes went away: the global map, and where that knows nothing, what the
+  /// local map saw free. Made anew by each call, over the whole map: for when there is no way.
+  const MapLayer& permissive();
   /// Cells whose state changed in the last call.
   std::size_t changed_cells() const { return changed_cells_; }
 
@@ -78,7 +81,7 @@ class CombinedMap {
 
   double reach_m_;
   int occupied_threshold_, free_threshold_;
-  MapLayer global_, combined_;
+  MapLayer global_, combined_, permissive_;
   TruncatedDistance distance_;
   CellWindow local_window_;             ///< of the last local map
   std::vector<CellState> local_cells_;  ///< of `local_window_`, row-major

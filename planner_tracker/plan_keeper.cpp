@@ -45,8 +45,7 @@ double PlanKeeper::old_cost_m(const MapLayer& layer, const Point2& robot) {
   return cost;
 }
 
-bool PlanKeeper::cut_at_blockage(const CombinedMap& map, std::vector<Point2>* way) {
-  const MapLayer& layer = map.combined();
+bool PlanKeeper::cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, std::vector<Point2>* way) {
   const double step = 0.5 * layer.geometry.resolution_m;
   std::vector<Point2> passed{way->front()};  // every step of the way before the blockage
   for (std::size_t i = 1; i < way->size(); ++i) {
@@ -63,7 +62,7 @@ bool PlanKeeper::cut_at_blockage(const CombinedMap& map, std::vector<Point2>* wa
       std::size_t end = passed.size() - 1;
       const auto away_m = [&](std::size_t k) { return std::hypot(passed[k].x_m - p.x_m, passed[k].y_m - p.y_m); };
       while (end > 0 && away_m(end - 1) <= config_.planning.look_distance_m &&
-             std::isfinite(planner_.segment_cost_m(map.global(), passed[end - 1], p))) {
+             std::isfinite(planner_.segment_cost_m(unchanged, passed[end - 1], p))) {
         --end;
       }
       // Never right up to it.
@@ -76,15 +75,16 @@ bool PlanKeeper::cut_at_blockage(const CombinedMap& map, std::vector<Point2>* wa
   return false;
 }
 
-bool PlanKeeper::way_to_look(const CombinedMap& map, const Point2& robot, std::vector<Point2>* way) {
+bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot,
+                             std::vector<Point2>* way) {
   std::vector<Point2> places;
   for (const double share : {1.0, 1.25}) {
     for (int k = 0; k < kDirections; ++k) {
       const double angle = 2.0 * kPi * k / kDirections, r = share * config_.planning.look_distance_m;
       const double c = std::cos(angle), s = std::sin(angle);
       const Point2 place{at_.x_m + r * c, at_.y_m + r * s}, before{at_.x_m + kStandsBefore_m * c, at_.y_m + kStandsBefore_m * s};
-      if (std::isfinite(planner_.segment_cost_m(map.combined(), place, before)) &&
-          std::isfinite(planner_.segment_cost_m(map.global(), before, at_))) {
+      if (std::isfinite(planner_.segment_cost_m(layer, place, before)) &&
+          std::isfinite(planner_.segment_cost_m(unchanged, before, at_))) {
         places.push_back(place);
       }
     }
@@ -92,7 +92,7 @@ bool PlanKeeper::way_to_look(const CombinedMap& map, const Point2& robot, std::v
   const auto away_m = [&](const Point2& p) { return std::hypot(p.x_m - robot.x_m, p.y_m - robot.y_m); };
   std::sort(places.begin(), places.end(), [&](const Point2& a, const Point2& b) { return away_m(a) < away_m(b); });
   for (std::size_t i = 0; i < std::min<std::size_t>(kMostTried, places.size()); ++i) {
-    planner_.plan(map.combined(), robot, places[i], &result_);
+    planner_.plan(layer, robot, places[i], &result_);
     if (result_.code != PlanCode::kOk) continue;
     *way = result_.path;
     return true;
@@ -100,7 +100,7 @@ bool PlanKeeper::way_to_look(const CombinedMap& map, const Point2& robot, std::v
   return false;
 }
 
-PlanKeeper::Outcome PlanKeeper::replan(const CombinedMap& map, const Point2& robot, const Point2& goal) {
+PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Point2& robot, const Point2& goal) {
   switched_ = false;
   const MapLayer& layer = map.combined();
   Outcome kind = Outcome::kToGoal;
@@ -134,18 +134,16 @@ PlanKeeper::Outcome PlanKeeper::replan(const CombinedMap& map, const Point2& rob
     path_.clear();
     return Outcome::kStartBlocked;
   }
-  // No way now. Has the unchanged map one, and where is it closed?
-  // Random moves may have led to where only the local map knows the floor.
-  Point2 start = robot;
-  if (!planner_.open(map.global(), robot)) planner_.nearest_open(map.global(), robot, config_.planning.goal_snap_m, &start);
-  planner_.plan(map.global(), start, goal, &result_);
+  // No way now. Would there be one, and where is it closed?
+  const MapLayer& unchanged = map.permissive();
+  planner_.plan(unchanged, robot, goal, &result_);
   if (result_.code != PlanCode::kOk) {
     at_ = result_.at;
     path_.clear();
     return Outcome::kNoPath;
   }
   std::vector<Point2> way = result_.path;
-  if (!cut_at_blockage(map, &way)) at_ = goal;
+  if (!cut_at_blockage(layer, unchanged, &way)) at_ = goal;
   const auto too_near = [&](const Point2& p) {
     return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kTooNear * config_.planning.look_distance_m;
   };
@@ -153,7 +151,7 @@ PlanKeeper::Outcome PlanKeeper::replan(const CombinedMap& map, const Point2& rob
   const bool keep = path_kind_ == Outcome::kToBlockage && std::isfinite(old_cost_m(layer, robot)) &&
                     !(robot_too_near && too_near(path_.end()));
   if (!keep) {
-    if (robot_too_near) way_to_look(map, robot, &way);
+    if (robot_too_near) way_to_look(layer, unchanged, robot, &way);
     take(way);
   }
   path_kind_ = Outcome::kToBlockage;

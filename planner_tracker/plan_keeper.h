@@ -30,7 +30,7 @@ class PlanKeeper {
 
   void set_map(const CombinedMap& map);
   void start_goal() { path_.clear(); }
-  Outcome replan(const CombinedMap& map, const Point2& robot, const Point2& goal);
+  Outcome replan(CombinedMap& map, const Point2& robot, const Point2& goal);
   /// True if the last replan() replaced the path by another.
   bool switched() const { return switched_; }
   int switches() const { return switches_; }
@@ -45,9 +45,9 @@ class PlanKeeper {
   void take(const std::vector<Point2>& path);
   /// Finds where the layer closes a way of the unchanged map (at_), and keeps the way's beginning up to where the robot
   /// can look at that from look_distance_m, or nearer where corners hide it. False if the layer does not close it.
-  bool cut_at_blockage(const CombinedMap& map, std::vector<Point2>* way);
+  bool cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, std::vector<Point2>* way);
   /// A way to the nearest place from which the blockage can be looked at, for a robot that stands too near to it.
-  bool way_to_look(const CombinedMap& map, const Point2& robot, std::vector<Point2>* way);
+  bool way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, std::vector<Point2>* way);
 
   PlannerTrackerConfig config_;
   GridPlanner planner_;

@@ -169,6 +169,8 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
   const bool first = goal_allowed_s > 1e8;
   outcome = keeper.replan(map, position(robot.T_map_base), position(goal));
   using Outcome = PlanKeeper::Outcome;
+  // There was a way to this goal before: it is where the robot stands that has none.
+  if (outcome == Outcome::kNoPath && !first) outcome = Outcome::kStartBlocked;
   const Point2& at = keeper.at();
   switch (outcome) {
     case Outcome::kToGoal:

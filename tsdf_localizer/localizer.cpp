@@ -249,7 +249,7 @@ void Localizer::State::decide() {
     lost = false;
     if (!health.good() && (health.support() < config.health.ok_fraction ||
                            health.fresh_support() < config.health.lost_fraction)) {
-      search.doubt(PoseSearch::Prior::kLocal, "");
+      search.doubt(PoseSearch::Prior::kTracked, "");
     }
   } else if (search.prior() == PoseSearch::Prior::kGiven && health.good() && !config.global_search.enabled) {
     search.end_doubt();

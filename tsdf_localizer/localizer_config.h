@@ -96,6 +96,7 @@ struct GlobalSearchConfig {
   int hypotheses = 24;
   int lookups_per_update = 3000000;
   double ambiguity_margin = 0.03;
+  int unseat_after = 4;
   double repeat_after_m = 0.5;
   double repeat_after_rad = 0.5;
   double repeat_after_s = 1.0;
@@ -116,6 +117,9 @@ struct GlobalSearchConfig {
         "Map cells read per scan while searching (about 2 ns each), which bounds the time of an update.");
     v.number("ambiguity_margin", ambiguity_margin, 0, 1, "",
              "Another place whose price is within this of the best one's makes the place ambiguous.");
+    v.integer("unseat_after", unseat_after, 1, 100, "",
+              "A pose that was tracked is given up for another only if that many searches, from places repeat_after_m or "
+              "repeat_after_rad apart, found the same other place clearly better; or when the verdict is lost.");
     v.number("repeat_after_m", repeat_after_m, 0.05, 50, "m",
              "In doubt, search again after driving this far, ...");
     v.number("repeat_after_rad", repeat_after_rad, 0.05, 50, "rad", "... or turning this far, ...");

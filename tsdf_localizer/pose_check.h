@@ -15,9 +15,9 @@ struct PoseCheck {
   std::uint32_t explained = 0;  ///< ends on a wall of the map, and nothing of the map stands before it
   std::uint32_t in_front = 0;   ///< ends in the map's open space: a person, moved furniture, or a wrong pose
   std::uint32_t through =
-      0;  ///< goes through a wall of the map: a door opened, furniture gone, or a wrong pose
+      0;  ///< goes through a wall of the map and ends nowhere in particular: a wrong pose, mostly
   std::uint32_t unknown = 0;   ///< ends where the map knows nothing
-  double cost = 1.0;           ///< weighted mean price in [0, 1]; a ray through a wall costs 1
+  double cost = 1.0;           ///< weighted mean price in [0, 1]; a ray through a wall costs 1, or a half if it ends on one
   double support = 1.0;        ///< see support_of(), over all rays
   double fresh_support = 1.0;  ///< the same, over the rays seen just now; 1 if there are too few of them
 

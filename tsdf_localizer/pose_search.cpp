@@ -14,18 +14,22 @@ void PoseSearch::doubt(Prior prior, const std::string& why) {
   in_doubt_ = true;
   prior_ = prior;
   why_ = why;
-  agreements_ = defeats_ = 0;
+  agreements_ = defeats_ = same_rival_ = 0;
   any_search_ = false;
   search_.cancel();
 }
 
 void PoseSearch::cut() {
+  same_rival_ = 0;
   search_.cancel();
   any_search_ = false;
 }
 
 void PoseSearch::move(const Pose2& T_before_after) {
   T_start_now_ = T_start_now_ * T_before_after;
+  T_rival_ = T_rival_ * T_before_after;
+  rival_m_ += std::hypot(T_before_after.x_m, T_before_after.y_m);
+  rival_rad_ += std::fabs(T_before_after.yaw_rad);
   distance_m_ += std::hypot(T_before_after.x_m, T_before_after.y_m);
   turn_rad_ += std::fabs(T_before_after.yaw_rad);
 }
@@ -50,6 +54,23 @@ bool PoseSearch::update(double stamp_s, const MapFields& fields, const ScanRays&
     any_search_ = true;
   }
   return search_.step(fields) && judge(fields, T_filter_now, belief);
+}
+
+/// A place that only happens to look right does not look right from the next place as well. Seen from one and the same place,
+/// it always does.
+bool PoseSearch::unseats_tracked(const Pose2& T_rival_filter, const Pose2& T_filter_now) {
+  const GlobalSearchConfig& c = config_.global_search;
+  const Pose2 T_rival = T_rival_filter * T_filter_now;
+  if (same_rival_ == 0 || !same_place(T_rival, T_rival_)) {
+    same_rival_ = 1;
+  } else if (rival_m_ < c.repeat_after_m && rival_rad_ < c.repeat_after_rad) {
+    return false;
+  } else {
+    ++same_rival_;
+  }
+  T_rival_ = T_rival;
+  rival_m_ = rival_rad_ = 0.0;
+  return same_rival_ >= c.unseat_after;
 }
 
 bool PoseSearch::judge(const MapFields& fields, const Pose2& T_filter_now, Belief* belief) {
@@ -88,7 +109,7 @@ bool PoseSearch::judge(const MapFields& fields, const Pose2& T_filter_now, Belie
   }
   const double my_cost = mine ? mine->cost : 1.0, rival_cost = rival ? rival->cost : 1.0;
   const double lead = rival_cost - my_cost;
-  const double needed = prior_ == Prior::kNone ? margin : prior_ == Prior::kLocal ? margin / 3.0 : -margin;
+  const double needed = prior_ == Prior::kNone ? margin : prior_ == Prior::kGiven ? -margin : margin / 3.0;
   if (mine && lead >= needed) {
     defeats_ = 0;
     if (mine->support < config_.health.ok_fraction) {
@@ -105,12 +126,20 @@ bool PoseSearch::judge(const MapFields& fields, const Pose2& T_filter_now, Belie
   }
   agreements_ = 0;
   if (mine && lead >= 0.0) {
-    defeats_ = 0;
+    defeats_ = same_rival_ = 0;
     why_ = fmt::format("{} other place(s) of the map fit the scan as well", as_good);
     return false;
   }
   // Another place is better. A little: let the filter decide. Clearly, and twice: move there.
   const bool clearly = lead < -margin;
+  if (prior_ == Prior::kTracked) {
+    why_ = "another place of the map fits the scan better, so far";
+    if (!clearly || rival == nullptr) {
+      same_rival_ = 0;
+      return false;
+    }
+    if (!unseats_tracked(rival->T_map_base * T_start_now_ * T_filter_now.inverse(), T_filter_now)) return false;
+  }
   defeats_ = clearly ? defeats_ + 1 : 0;
   const double fraction = !clearly ? 0.3 : defeats_ >= 2 ? 0.95 : 0.5;
   belief->inject(now_, fraction, temperature);

@@ -17,9 +17,11 @@ class PoseSearch {
  public:
   /// Where the estimate comes from, that is how much better another place must be to unseat it.
   enum class Prior {
-    kNone,   ///< from a search: ok only if clearly the best place
-    kLocal,  ///< it was right a while ago: ok if no other place is as good
-    kGiven   ///< somebody says so: ok unless another place is clearly better
+    kNone,     ///< from a search: ok only if clearly the best place
+    kTracked,  ///< it was right, and the motion since is known, but much of the scan is not explained: people and moved
+               ///< furniture do that. Another place must be clearly better again and again, and be the same place each time
+    kLocal,    ///< it was right a while ago: ok if no other place is as good
+    kGiven     ///< somebody says so: ok unless another place is clearly better
   };
 
   explicit PoseSearch(const LocalizerConfig& config);
@@ -45,6 +47,7 @@ class PoseSearch {
 
  private:
   bool due(double stamp_s) const;
+  bool unseats_tracked(const Pose2& T_rival_filter, const Pose2& T_filter_now);
   bool judge(const MapFields& fields, const Pose2& T_filter_now, Belief* belief);
 
   LocalizerConfig config_;
@@ -57,6 +60,9 @@ class PoseSearch {
   bool any_search_ = false;
   int agreements_ = 0;           ///< searches in a row that found the estimate to be the best place
   int defeats_ = 0;              ///< searches in a row that found a better one
+  Pose2 T_rival_;                ///< where the better one of the last search is now
+  int same_rival_ = 0;           ///< searches in a row, from places apart, that found that one
+  double rival_m_ = 0.0, rival_rad_ = 0.0;  ///< driven and turned since one of them was counted
   std::vector<Hypothesis> now_;  ///< hypotheses at the time of the filter
 };
 

@@ -190,6 +190,34 @@ TEST(LocalizerRecovery, KidnappedWithoutNoticeIsLostThenComesBack) {
   EXPECT_LT(distance_m(localizer.result().T_map_base, second.back()), 0.15);
 }
 
+TEST(LocalizerRecovery, ATrackedPoseIsNotLeftForAPlaceThatLooksBetterFromOneSpot) {
+  // When it was mapped, the left room was full of cabinets. They are gone, so that inside it looks like the right room.
+  const Building world = test::twin_rooms();
+  Building mapped = world;
+  mapped.wall(0.2, 3.2, 1.2, 7.4);
+  mapped.wall(1.2, 8.0, 3.6, 8.8);
+  mapped.wall(4.6, 3.2, 6.0, 5.6);
+  LocalizerConfig config;
+  config.health.ok_fraction = 0.9;  // so that the missing cabinets are enough for doubt
+  Localizer localizer{config};
+  localizer.set_map(mapped.distance_map());
+  ScanModel laser;
+  laser.rays = 720;
+  laser.noise_m = 0.02;
+  double t = 0.0;
+  const std::vector<Pose2> way = test::drive({{4.0, 2.0}, {3.0, 2.0}, {3.0, 5.0}}, kRate_hz);
+  localizer.initialize(way.front(), Eigen::Vector3d(0.04, 0.04, 0.01).asDiagonal());
+  double uncertain_s = 0.0;
+  const auto look = [&](const Pose2& pose) {
+    const LocalizerResult& r = localizer.update(make_scan(world, pose, laser, t += 1.0 / kRate_hz), Pose2(), pose, 1);
+    uncertain_s += r.verdict == V::kUncertain ? 1.0 / kRate_hz : 0.0;
+    ASSERT_LT(distance_m(r.T_map_base, pose), 0.5) << "after " << t << " s: " << r.reason;
+  };
+  for (const Pose2& pose : way) look(pose);
+  for (int i = 0; i < 20 * static_cast<int>(kRate_hz); ++i) look(way.back());
+  EXPECT_GT(uncertain_s, 5.0) << "it should say that much is not explained";
+}
+
 TEST(LocalizerRecovery, AWrongInitialPoseIsNotedAndLeft) {
   const Building office = test::office();
   Localizer localizer{LocalizerConfig()};
