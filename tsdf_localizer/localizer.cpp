@@ -256,7 +256,11 @@ void Localizer::State::decide() {
   }
   if (health.lost() && !lost) {
     lost = true;
-    search.doubt(PoseSearch::Prior::kNone, "lost");
+    // Before moved furniture as little may be explained as after a kidnap: where the robot was is still the best guess.
+    const bool found_by_search = search.in_doubt() && search.prior() == PoseSearch::Prior::kNone;
+    search.doubt(found_by_search ? PoseSearch::Prior::kNone : PoseSearch::Prior::kTracked, "lost");
+  } else if (lost && health.good()) {
+    lost = false;  // looking round showed more of what the map knows
   }
   if (lost) {
     return say(V::kLost,

@@ -119,7 +119,7 @@ struct GlobalSearchConfig {
              "Another place whose price is within this of the best one's makes the place ambiguous.");
     v.integer("unseat_after", unseat_after, 1, 100, "",
               "A pose that was tracked is given up for another only if that many searches, from places repeat_after_m or "
-              "repeat_after_rad apart, found the same other place clearly better; or when the verdict is lost.");
+              "repeat_after_rad apart, found the same other place clearly better.");
     v.number("repeat_after_m", repeat_after_m, 0.05, 50, "m",
              "In doubt, search again after driving this far, ...");
     v.number("repeat_after_rad", repeat_after_rad, 0.05, 50, "rad", "... or turning this far, ...");
