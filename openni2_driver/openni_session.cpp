@@ -177,6 +177,17 @@ void OpenNISession::configure(const OpenNIDeviceConfig& config) {
 }
 
 OpenNISession::~OpenNISession() {
+  if (parts_->is_file) {
+    // The stock file driver's thread walks its list of streams without a lock, all the time once none is started: taking the last one
+    // off that list crashes one time in twenty on a busy machine. Closing the device ends the thread first, and the streams with it;
+    // what is left of them here (a few hundred bytes) must not be destroyed again.
+    for (auto& open : parts_->streams) {
+      if (open) open->signal.disconnect(open->stream._getHandle());
+    }
+    parts_->device.close();
+    for (auto& open : parts_->streams) (void)open.release();
+    return;
+  }
   parts_->stop(SensorStream::kDepth);
   parts_->stop(SensorStream::kInfrared);
   parts_->device.close();
