@@ -182,7 +182,9 @@ OpenNISession::~OpenNISession() {
     // off that list crashes one time in twenty on a busy machine. Closing the device ends the thread first, and the streams with it;
     // what is left of them here (a few hundred bytes) must not be destroyed again.
     for (auto& open : parts_->streams) {
-      if (open) open->signal.disconnect(open->stream._getHandle());
+      if (!open) continue;
+      open->stream.stop();
+      open->signal.disconnect(open->stream._getHandle());
     }
     parts_->device.close();
     for (auto& open : parts_->streams) (void)open.release();
