@@ -12,7 +12,6 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kOffPath_m = 0.5;
 constexpr double kNearestLook_m = 0.25;
 constexpr double kStandsBefore_m = 0.6;  ///< what closes a way may reach this far before the point where it does
-constexpr double kTooNear = 0.75;        ///< of look_distance_m
 constexpr int kDirections = 24;
 constexpr int kMostTried = 4;
 
@@ -145,7 +144,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Point2& robot, co
   std::vector<Point2> way = result_.path;
   if (!cut_at_blockage(layer, unchanged, &way)) at_ = goal;
   const auto too_near = [&](const Point2& p) {
-    return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kTooNear * config_.planning.look_distance_m;
+    return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < config_.planning.too_near_m();
   };
   const bool robot_too_near = too_near(robot);
   const bool keep = path_kind_ == Outcome::kToBlockage && std::isfinite(old_cost_m(layer, robot)) &&

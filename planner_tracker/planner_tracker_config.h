@@ -38,6 +38,8 @@ struct PlanningConfig {
   double look_distance_m = 1.8;
   double back_up_after_s = 1.5;
   double closed_memory_s = 120.0;
+  /// Nearer to a closed place than this, the robot looks at it from elsewhere.
+  double too_near_m() const { return 0.75 * look_distance_m; }
   double slowness = 5.0;
   double goal_snap_m = 1.5;
 

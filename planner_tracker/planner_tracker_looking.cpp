@@ -10,7 +10,6 @@ namespace {
 constexpr double kArrived_m = 0.15;
 constexpr double kFacing_rad = 0.2;
 constexpr double kStandsBefore_m = 0.8;    ///< what closes the way, and the robot's radius, reach this far before the point
-constexpr double kTooNear = 0.75;          ///< of look_distance_m
 constexpr double kEnoughFarther_m = 0.15;  ///< less is not worth backing up for
 constexpr double kFreeBehind_m = 0.25;
 constexpr double kJustDriven_s = 12.0, kBesideTrack_m = 0.1;
@@ -21,13 +20,12 @@ bool PlannerTracker::State::looking(double now_s, const RobotState& robot) {
   const Path& path = keeper.path();
   const Point2 p = robot.T_map_base.inverse() * keeper.at();
   const double distance = std::hypot(p.x_m, p.y_m), bearing = std::atan2(p.y_m, p.x_m);
-  const double wanted = config.planning.look_distance_m;
   const bool closed = outcome == PlanKeeper::Outcome::kToBlockage;
   const bool arrived = path.remaining_m() + path.offset_m() < kArrived_m;
-  const bool in_view = closed && distance < wanted + kArrived_m &&
+  const bool in_view = closed && distance < config.planning.look_distance_m + kArrived_m &&
                        tracker.straight_free_m(input, bearing, distance) > distance - kStandsBefore_m;
   if (in_view && backing_up(now_s, robot, keeper.at())) return true;
-  if (!arrived && (!in_view || distance < kTooNear * wanted)) return false;
+  if (!arrived && (!in_view || distance < config.planning.too_near_m())) return false;
   if (looking_since_s < 0.0) looking_since_s = now_s;
   act(Activity::kWaiting, std::abs(bearing) > kFacing_rad ? tracker.turn(input, bearing) : tracker.stop(input));
   return true;

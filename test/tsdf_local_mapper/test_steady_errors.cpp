@@ -100,7 +100,7 @@ TEST(SteadyErrors, WhatTheViewChoseIsKnownWhereThereIsNoView) {
 }
 
 TEST(SteadyErrors, TurnsAreToldFromTurningWhileDriving) {
-  // Odometry turns 5 % too little, and 0.01 rad / m while driving straight. Straight stretches show the one, turns in place
+  // Odometry turns 15 % too little, and misses 0.05 rad / m while driving straight. Straight stretches show the one, turns in place
   // the other; after both, each is known. Every step keeps the particle that turned as the robot did, as a sharp view would.
   SteadyErrorsConfig config;
   config.memory_m = 1e6;
@@ -122,17 +122,17 @@ TEST(SteadyErrors, TurnsAreToldFromTurningWhileDriving) {
   };
   for (int k = 0; k < 400; ++k) {
     if ((k / 50) % 2 == 0) {
-      step_and_look({0.02, 0.0, 0.0}, 0.01 * 0.02);
+      step_and_look({0.02, 0.0, 0.0}, 0.05 * 0.02);
     } else {
-      step_and_look({0.0, 0.0, 0.02}, 1.05 * 0.02);
+      step_and_look({0.0, 0.0, 0.02}, 1.15 * 0.02);
     }
   }
-  // What remains unknown of each, by the same rule as above: 0.002 / (0.02 sqrt(200)) = 0.0071 rad / m, and as much of turns
-  // (a little less with the prior). Three times that.
-  EXPECT_NEAR(errors.mean()[1], 0.01, 0.021);
-  EXPECT_NEAR(errors.mean()[2], 0.05, 0.021);
-  EXPECT_LT(errors.sd()[1], 0.02);
-  EXPECT_LT(errors.sd()[2], 0.05);
+  // What remains unknown of each, by the same rule as above from 200 readings of 0.002 / 0.02 = 0.1 (rad / m, and share) each:
+  // 1 / sqrt(1 / 0.02^2 + 200 / 0.1^2) and 1 / sqrt(1 / 0.05^2 + 200 / 0.1^2). The prior draws the means to 0 by 11 % and 2 %.
+  EXPECT_NEAR(errors.sd()[1], 0.00667, 2e-5);
+  EXPECT_NEAR(errors.sd()[2], 0.00700, 2e-5);
+  EXPECT_NEAR(errors.mean()[1], 0.05 * 0.889, 3.0 * 0.00667);
+  EXPECT_NEAR(errors.mean()[2], 0.15 * 0.980, 3.0 * 0.00700);
 }
 
 TEST(SteadyErrors, SameSeedSameBytes) {
