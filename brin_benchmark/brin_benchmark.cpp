@@ -23,7 +23,7 @@ const char* const kFooter =
 crosses), _truth.tum, _estimate.tum, and run_NN_LEG.bag with the 30 s before each failure; report.json and report.md.
 What OUT has already is not driven again, so an interrupted benchmark goes on where it stopped; runs made apart with
 --run K (GNU parallel, Slurm) are put together by --merge.
-report.json: runs, legs, failures, collisions, walker_contacts (counts), time_s, distance_m, {mean,max}_time_to_failure_s,
+run_NN.json has collisions_at[]: time_s since the run began, x_m and y_m of the robot in the world. report.json: runs, legs, failures, collisions, walker_contacts (counts), time_s, distance_m, {mean,max}_time_to_failure_s,
 {mean,max}_distance_to_failure_m, average_speed_mps, positioning_error_{mean,sd,max}_m, the 95 % intervals of
 failures_per_run, speed_mps and positioning_error_m, and each run with its legs.)";
 

@@ -60,6 +60,7 @@ TEST(Scoring, ARunComesBackFromItsFileAsItWas) {
   RunResult run = run_of({reached(10, 4, 0.125), failed(3, 1)});
   run.collisions = 2;
   run.wall_s = 7.5;
+  run.collisions_at.push_back({12.5, 3.0, -4.0});
   const RunResult again = run_from_json(to_json(run), "run_01.json");
   EXPECT_EQ(to_json(again), to_json(run));
 }

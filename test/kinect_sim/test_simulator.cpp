@@ -171,6 +171,21 @@ TEST(Simulator, KidnappingMovesTheTruthButNotTheOdometry) {
   EXPECT_THROW(simulator.set_pose({2.9, 0, 0}), UserError);
 }
 
+TEST(People, WhoeverStandsAgainstARobotThatStandsOrTurnsIsNotRunInto) {
+  // 0.39 m between the middles, radii of 0.20 and 0.25 m: they touch from the start.
+  Simulator simulator(parse_world("people: [{name: Ann, path: [[0.16, 0.36]], speed_mps: 1.0}]", "field"), exact());
+  drive(simulator, 0.0, 0.0, 1.0);
+  drive(simulator, 0.0, 0.5, 1.0);
+  EXPECT_EQ(simulator.contacts().collisions, 0u);
+  EXPECT_EQ(simulator.contacts().walker_contacts, 1u) << "she touches the robot";
+  drive(simulator, 0.3, 0.0, 1.0);  // towards her: held, and the same contact still
+  EXPECT_EQ(simulator.T_world_base().x_m, 0.0);
+  drive(simulator, -0.3, 0.0, 1.0);
+  EXPECT_LT(simulator.T_world_base().x_m, -0.2);
+  drive(simulator, 0.3, 0.0, 3.0);
+  EXPECT_EQ(simulator.contacts().collisions, 1u);
+}
+
 TEST(People, StandStillRobotIsWalkedRoundAndNeverTouched) {
   SimulatorConfig config = exact();
   const WorldConfig world = parse_world(
