@@ -75,9 +75,10 @@ double ScanAccuracy::quantile_m(double share) const {
 }
 
 MapperAccuracy measure_mapper(const ProfileRecording& recording, const LocalMapperConfig& config,
-                              bool scans) {
+                              bool scans, const RangeOffsets* known) {
   MapperAccuracy accuracy;
   LocalMapper mapper(config);
+  if (known) mapper.start_from(*known);
   MapperTrajectory trajectory;
   DepthProfile profile;
   RangeScan scan, perfect;
@@ -116,6 +117,7 @@ MapperAccuracy measure_mapper(const ProfileRecording& recording, const LocalMapp
   accuracy.lost = accuracy.segment[0].translation_max_m > kLost_m;
   accuracy.estimate = trajectory.estimate();
   accuracy.odometry = trajectory.odometry();
+  accuracy.learned = mapper.range_offsets();
   accuracy.epochs = trajectory.epochs();
   accuracy.path_m = trajectory.path_m();
   if (recording.frames() > 0)

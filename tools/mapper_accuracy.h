@@ -32,10 +32,13 @@ struct MapperAccuracy {
   std::vector<double> lifespan_s;  ///< of the generations of particles
   ScanAccuracy scan;
   Trajectory estimate, odometry;
+  RangeOffsets learned;  ///< of the sensor, at the end
 };
 
 /// Maps a recorded drive and compares with the truth.
 /// @param scans  compare the virtual scan too
-MapperAccuracy measure_mapper(const ProfileRecording& recording, const LocalMapperConfig& config, bool scans);
+/// @param known  what an earlier drive taught of the sensor, if anything
+MapperAccuracy measure_mapper(const ProfileRecording& recording, const LocalMapperConfig& config, bool scans,
+                              const RangeOffsets* known = nullptr);
 
 }  // namespace knav

@@ -22,9 +22,10 @@ constexpr char kHelp[] =
     "trajectory and virtual scan with the truth. Rows of the table:\n"
     "  ideal       a depth camera without faults: what the method alone costs\n"
     "  calibrated  a Kinect after calibration, odometry a few per cent wrong\n"
+    "  driven      the same, by a robot that drove before: it begins with what another drive taught of its camera\n"
     "  default     a Kinect as bought, uncalibrated: up to 10 % wrong at 10 m\n"
     "  harsh       a bad one, uncalibrated: up to 16 %\n"
-    "  paper       as calibrated, with the paper's variants of cost, weights and clock\n"
+    "  paper       as calibrated, the local mapper as in --paper-config\n"
     "  people      as calibrated, with twenty people walking about";
 constexpr char kJsonHelp[] =
     R"(The JSON holds, per row: seeds, worlds and sensor; runs[]: seed, segments."20", "50", "100" (metres of path):
@@ -35,39 +36,24 @@ worst_to_mean_20_m. lost: some 20 m segment is more than 2 m off. scan: rays wit
 8 m; a false obstacle is a return 0.3 m and 5 % nearer than anything within 0.1 m beside its ray.)";
 
 struct Options {
-  std::string worlds = "config/worlds", cache, config, json, trajectories;
-  std::vector<std::string> rows = {"calibrated", "harsh", "paper", "people"};
+  std::string worlds = "config/worlds", cache, config, paper_config = "config/paper_full.yaml", json, trajectories;
+  std::vector<std::string> rows = {"calibrated", "driven", "harsh", "paper", "people"};
   int seeds = 10, first_seed = 1, mapper_seed = -1;
   bool quick = false, fresh = false, record_only = false, no_scans = false;
 };
 
 struct Row {
   std::string name, world = "brin_building.yaml", sensor = "calibrated";
-  bool paper = false;
+  bool paper = false, driven = false;
 };
 
 Row row_named(const std::string& name) {
   Row row{name};
   if (name == "ideal" || name == "default" || name == "harsh") row.sensor = name;
-  if (name == "paper") row.paper = true;
+  row.paper = name == "paper";
+  row.driven = name == "driven";
   if (name == "people") row.world = "brin_people.yaml";
   return row;
-}
-
-void make_paper(LocalMapperConfig* config) {
-  config->filter.alignment_cost = "paper";
-  config->filter.misfit_cost = config->filter.depth_trust_m = 0.0;
-  config->odometry_errors.memory_m = 0.0;
-  config->motion.translation_per_translation = 0.1;
-  config->motion.translation_per_rotation = 0.05;
-  config->motion.rotation_per_rotation = 0.35;
-  config->motion.sideways_per_translation = 0.05;
-  config->motion.translation_floor_m = 0.002;
-  config->motion.rotation_floor_rad = 0.001;
-  config->tsdf.truncation.behind_power = 0;
-  config->window.clock = "paper";
-  config->contour.surface_within = 1.0;
-  config->tsdf.appear_range_m = 0.0;
 }
 
 nlohmann::json to_json(const ErrorStatistics& e, double length_m) {
@@ -177,7 +163,7 @@ void benchmark(const Options& options) {
   for (const std::string& name : options.rows) {
     for (int s = 0; s < seeds; ++s) {
       const Row row = row_named(name);
-      if (!row.paper && !recordings.have(drive_of(row, options.first_seed + s))) ++missing;
+      if (!row.paper && !row.driven && !recordings.have(drive_of(row, options.first_seed + s))) ++missing;
     }
   }
   if (missing > 0) {
@@ -188,8 +174,8 @@ void benchmark(const Options& options) {
   if (!options.record_only) print_head();
   for (const std::string& name : options.rows) {
     const Row row = row_named(name);
-    LocalMapperConfig config = mapper_config;
-    if (row.paper) make_paper(&config);
+    LocalMapperConfig config =
+        row.paper ? read_config_section<LocalMapperConfig>(options.paper_config, "local_mapper") : mapper_config;
     nlohmann::json runs = nlohmann::json::array();
     ScanAccuracy scan;
     for (int s = 0; s < seeds; ++s) {
@@ -201,7 +187,14 @@ void benchmark(const Options& options) {
       }
       const ProfileRecording recording = recordings.get(drive);
       config.seed = options.mapper_seed >= 0 ? options.mapper_seed : seed;
-      const MapperAccuracy accuracy = measure_mapper(recording, config, !options.no_scans);
+      RangeOffsets known;
+      if (row.driven) {
+        const int before = options.first_seed + (s + 1) % std::max(2, seeds);
+        known = measure_mapper(recordings.get(drive_of(row, before)), config, false).learned;
+        stop_if_interrupted();
+      }
+      const MapperAccuracy accuracy =
+          measure_mapper(recording, config, !options.no_scans, row.driven ? &known : nullptr);
       stop_if_interrupted();
       scan.add(accuracy.scan);
       if (!options.trajectories.empty()) {
@@ -238,7 +231,7 @@ int main(int argc, char** argv) {
   options.cache = knav::default_cache();
   app.add_option("--rows", options.rows, "Which rows, separated by commas")
       ->delimiter(',')
-      ->check(CLI::IsMember({"ideal", "calibrated", "default", "harsh", "paper", "people"}))
+      ->check(CLI::IsMember({"ideal", "calibrated", "driven", "default", "harsh", "paper", "people"}))
       ->capture_default_str();
   app.add_option("--seeds", options.seeds, "Drives a row")->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--first-seed", options.first_seed, "Seed of the first drive")
@@ -246,6 +239,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--mapper-seed", options.mapper_seed, "Seed of the mapper; otherwise that of the drive");
   app.add_option("--config", options.config, "Configuration file; its front end and 'local_mapper' are used");
+  app.add_option("--paper-config", options.paper_config, "The same of the row 'paper'; only 'local_mapper' is used")
+      ->capture_default_str();
   app.add_option("--worlds", options.worlds,
                  "Folder of brin_building.yaml, brin_people.yaml and brin_tour.yaml")
       ->capture_default_str();

@@ -21,7 +21,7 @@ namespace knav {
 namespace {
 
 struct Options {
-  std::string bag, trajectory, config, map_out, json, profiles;
+  std::string bag, range_errors, trajectory, config, map_out, json, profiles;
   std::string from = "auto";
   int seed = -1;
   bool odometry_only = false;
@@ -39,6 +39,9 @@ void replay(const Options& options) {
   reader_config.source = options.from;
   ObservationReader reader(options.bag, reader_config, FrontEndConfig::from_file(options.config));
   LocalMapper mapper(mapper_config);
+  if (!options.range_errors.empty() && std::filesystem::exists(options.range_errors)) {
+    mapper.start_from(RangeOffsets::load(options.range_errors));
+  }
   MapperTrajectory recorder;
   Progress progress("replay (" + reader.source() + ")");
 
@@ -66,6 +69,7 @@ void replay(const Options& options) {
 
   write_trajectory(options.trajectory, options.odometry_only ? recorder.odometry() : recorder.estimate());
   if (!options.profiles.empty()) write_text_atomically(options.profiles, profiles_csv);
+  if (!options.range_errors.empty()) mapper.range_offsets().save(options.range_errors);
   if (!options.map_out.empty()) write_local_map_pictures(options.map_out, mapper);
   const double recording_s = reader.statistics().last_stamp_s - reader.statistics().first_stamp_s;
   const nlohmann::json json = {{"source", reader.source()},
@@ -101,6 +105,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--map-out", options.map_out, "folder for local_map.png, tsdf.png and scan_360.png of the end");
   app.add_option("--profiles", options.profiles, "write every depth profile as CSV: stamp [s], then z [m] per column");
+  app.add_option("--range-errors", options.range_errors,
+                 "what is learned of the depth camera's errors: read from this file if there is one, and written to it at the end");
   app.add_option("--json", options.json, "write the figures to this file; '-' for standard output");
   app.add_flag("--odometry", options.odometry_only, "write the odometry at the same stamps instead, to compare");
   app.footer(knav::kJsonHelp);

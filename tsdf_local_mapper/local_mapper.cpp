@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include "core/config.h"
 #include "core/contour.h"
 #include "core/pose_buffer.h"
 #include "tsdf_local_mapper/local_map.h"
 #include "tsdf_local_mapper/pose_filter.h"
+#include "tsdf_local_mapper/range_errors.h"
 #include "tsdf_local_mapper/sliding_window.h"
 #include "tsdf_local_mapper/view_check.h"
 
@@ -85,7 +87,8 @@ struct LocalMapper::State {
         grid(c.tsdf, c.grid_half_size_m),
         window(c.window),
         filter(c.filter, c.motion, c.odometry_errors, static_cast<std::uint64_t>(c.seed)),
-        view_check(c.continuity, c.contour, c.range_max_m) {}
+        view_check(c.continuity, c.contour, c.range_max_m),
+        range_errors(c.range_errors, c.tsdf) {}
 
   void add_odometry(double stamp_s, const Pose2& T_odom_base);
   void new_epoch(EpochReason why, const std::string& text);
@@ -93,7 +96,9 @@ struct LocalMapper::State {
   void note_motion(double stamp_s);
   void select_points(const TsdfObservation& observation, const Pose2& T_base_sensor);
   float weight_of(const TsdfObservation& observation, std::size_t column) const;
-  double evidence_of(double dt_s) const;
+  double evidence_of(double dt_s, double turn_rad) const;
+  template <class Frame>
+  void observe(const Frame& frame);
   void align(const Pose2& T_step, const Pose2& T_base_sensor, double dt_s);
   void integrate(const Pose2& T_base_sensor);
   const LocalMapperResult& reject(FrameOutcome outcome, double stamp_s, const std::string& reason);
@@ -106,6 +111,8 @@ struct LocalMapper::State {
   SlidingWindow window;
   PoseFilter filter;
   ViewCheck view_check;
+  RangeErrors range_errors;
+  DepthProfile corrected;
   PoseBuffer odometry;
   bool odometry_broken = false;  ///< a gap or jump since the last frame
   EpochReason odometry_fault = EpochReason::kOdometryGap;
@@ -163,6 +170,7 @@ const LocalMapperResult& LocalMapper::State::reject(FrameOutcome outcome, double
 void LocalMapper::State::new_epoch(EpochReason why, const std::string& text) {
   grid.clear();
   window.clear();
+  range_errors.new_map();
   have_map = false;
   view_check.reset();
   if (any_epoch) ++result.epoch;
@@ -209,9 +217,26 @@ float LocalMapper::State::weight_of(const TsdfObservation& o, std::size_t column
 
 /// How much of a frame's evidence is new. A Kinect's bands, blobs of noise and wrong scale stay for many
 /// frames; taken for new evidence thirty times a second they pull the estimate after them.
-double LocalMapper::State::evidence_of(double dt_s) const {
-  if (config.filter.evidence_period_s <= 0.0 || config.filter.alignment_cost == "paper") return 1.0;
-  return std::clamp(dt_s / config.filter.evidence_period_s, 0.02, 1.0);
+double LocalMapper::State::evidence_of(double dt_s, double turn_rad) const {
+  const FilterConfig& filter_config = config.filter;
+  if (filter_config.evidence_period_s <= 0.0 || filter_config.alignment_cost == "paper") return 1.0;
+  const double turned =
+      filter_config.evidence_turn_rad > 0.0 ? std::fabs(turn_rad) / filter_config.evidence_turn_rad : 0.0;
+  return std::clamp(dt_s / filter_config.evidence_period_s + turned, 0.02, 1.0);
+}
+
+/// The frame as the window's next observation.
+template <class Frame>
+void LocalMapper::State::observe(const Frame& frame) {
+  if constexpr (std::is_same_v<Frame, DepthProfile>) {
+    if (range_errors.on()) {
+      corrected = frame;
+      range_errors.correct(window.next_sequence(), &corrected);
+      observation_from(corrected, limits, &window.scratch());
+      return;
+    }
+  }
+  observation_from(frame, limits, &window.scratch());
 }
 
 /// The readings that the filter compares: at most config.filter.readings, evenly over the valid columns.
@@ -237,6 +262,7 @@ void LocalMapper::State::integrate(const Pose2& T_base_sensor) {
   grid.scroll_to(result.T_local_base.x_m, result.T_local_base.y_m, window.next_sequence());
   window.expire(&grid, clock_s, travelled_m);
   window.push(&grid, clock_s, travelled_m, parked && config.window.clock == "moving");
+  if (range_errors.on()) range_errors.learn(window, travelled_m, grid, config.contour);
 }
 
 void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, double dt_s) {
@@ -254,7 +280,7 @@ void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, 
   } else {
     filter.predict(T_step);
     if (readings) {
-      filter.update(grid, &points, result.stamp_s, evidence_of(dt_s));
+      filter.update(grid, &points, result.stamp_s, evidence_of(dt_s, T_step.yaw_rad));
     } else {
       filter.estimate_from_particles();
     }
@@ -330,7 +356,7 @@ const LocalMapperResult& LocalMapper::State::update(const Frame& frame, bool sen
   travelled_m += std::hypot(T_step.x_m, T_step.y_m);
   if (!parked || config.window.clock == "paper") clock_s += dt;
 
-  observation_from(frame, limits, &window.scratch());
+  observe(frame);
   align(T_step, T_base_sensor, dt);
   newest_integrated = result.outcome != FrameOutcome::kSuspicious;
   if (newest_integrated) integrate(T_base_sensor);
@@ -395,6 +421,8 @@ void LocalMapper::reset() {
 const LocalMapperConfig& LocalMapper::config() const { return state_->config; }
 const LocalMapperResult& LocalMapper::result() const { return state_->result; }
 const TsdfGrid& LocalMapper::grid() const { return state_->grid; }
+RangeOffsets LocalMapper::range_offsets() const { return state_->range_errors.offsets(); }
+void LocalMapper::start_from(const RangeOffsets& offsets) { state_->range_errors.start_from(offsets); }
 const ParticleSet& LocalMapper::particles() const { return state_->filter.particles(); }
 
 }  // namespace knav

@@ -79,6 +79,11 @@ class LocalMapper {
   /// Forgets map, pose and odometry; a new epoch.
   void reset();
 
+  /// What was learned of the depth camera's steady errors.
+  RangeOffsets range_offsets() const;
+  /// Begins with what an earlier drive learned of them.
+  void start_from(const RangeOffsets& offsets);
+
   const LocalMapperConfig& config() const;
   const LocalMapperResult& result() const;
   const TsdfGrid& grid() const;

@@ -6,31 +6,11 @@
 #include "core/contour.h"
 #include "core/motion_model.h"
 #include "core/tsdf_grid.h"
+#include "tsdf_local_mapper/range_errors.h"
 #include "tsdf_local_mapper/steady_errors.h"
+#include "tsdf_local_mapper/window_config.h"
 
 namespace knav {
-
-/// Which observations the map holds (paper section III.E: 120 s, 20 m).
-struct WindowConfig {
-  double duration_s = 120.0;
-  double distance_m = 20.0;
-  std::string clock = "moving";
-  int max_observations = 3600;
-  int parked_observations = 60;
-
-  template <class Visitor>
-  void visit(Visitor& v) {
-    v.number("duration_s", duration_s, 1, 3600, "s", "An observation leaves the map after this long.");
-    v.number("distance_m", distance_m, 1, 200, "m", "An observation leaves after the robot drove this far.");
-    v.choice("clock", clock, {"paper", "moving"},
-             "What duration_s counts: all time, or only the time the robot moves (a parked robot keeps its "
-             "walls).");
-    v.integer("max_observations", max_observations, 10, 100000, "frames",
-              "The oldest leaves when there are more.");
-    v.integer("parked_observations", parked_observations, 1, 100000, "frames",
-              "While parked (clock: moving) only this many of the newest frames of that place are held.");
-  }
-};
 
 /// The particle filter over the robot's pose (paper section III.E).
 struct FilterConfig {
@@ -44,6 +24,7 @@ struct FilterConfig {
   int refinements = 0;
   double depth_trust_m = 3.0;
   double evidence_period_s = 0.3;
+  double evidence_turn_rad = 0.1;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -71,6 +52,9 @@ struct FilterConfig {
              "Frames closer together than this share errors, and so count by the share of it that has "
              "passed; 0 = every frame "
              "in full.");
+    v.number("evidence_turn_rad", evidence_turn_rad, 0, 10, "rad",
+             "A turn shows each thing to other columns, with other errors: a turn by this much is as new as evidence_period_s. 0 = only "
+             "time counts.");
   }
 };
 
@@ -113,6 +97,7 @@ struct LocalMapperRosConfig {
   double local_map_rate_hz = 5.0;
   double particlecloud_rate_hz = 2.0;
   int frames_waiting = 5;
+  std::string range_errors_file;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -125,6 +110,9 @@ struct LocalMapperRosConfig {
     v.integer(
         "frames_waiting", frames_waiting, 1, 100, "frames",
         "Frames that wait for odometry to cover their stamp; the oldest is dropped when there are more.");
+    v.text("range_errors_file", range_errors_file,
+           "What was learned of the depth camera's errors is read from here at the start and kept here (each minute, and at the "
+           "end), one file per camera. Empty: every start learns anew.");
   }
 };
 
@@ -140,6 +128,7 @@ struct LocalMapperConfig {
   FilterConfig filter;
   MotionModelConfig motion;
   SteadyErrorsConfig odometry_errors;
+  RangeErrorsConfig range_errors;
   ContourConfig contour;
   ContinuityConfig continuity;
   LocalMapperRosConfig ros;
@@ -161,6 +150,7 @@ struct LocalMapperConfig {
     v.group("filter", filter, "The particle filter.");
     v.group("motion", motion, "How wrong odometry may be from step to step.");
     v.group("odometry_errors", odometry_errors, "How wrong it may be steadily, which the filter learns.");
+    v.group("range_errors", range_errors, "How wrong the depth camera may be steadily, which the mapper learns.");
     v.group("contour", contour, "The virtual 360-degree scan.");
     v.group("continuity", continuity, "Gaps, jumps and being carried.");
     v.group("ros", ros, "Frames and rates of the nodelet; no effect offline.");

@@ -12,6 +12,7 @@
 #include <array>
 #include <chrono>
 #include <deque>
+#include <filesystem>
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 #include <string>
@@ -26,17 +27,30 @@
 namespace knav {
 
 class LocalMapperNodelet : public NodeletBase {
+ public:
+  ~LocalMapperNodelet() override { keep_range_offsets(); }
+
  private:
   struct Pending {
     kinect_nav::DepthProfileConstPtr profile;
     sensor_msgs::LaserScanConstPtr scan;
   };
   using Clock = std::chrono::steady_clock;
+  static constexpr int kKeepEvery_s = 60;
 
   void start() override {
     ros::NodeHandle& node = getNodeHandle();  // one thread: callbacks never overlap
     config_ = read_parameters<LocalMapperConfig>(getPrivateNodeHandle());
     mapper_ = std::make_unique<LocalMapper>(config_);
+    offsets_file_ = config_.ros.range_errors_file;
+    if (!offsets_file_.empty() && std::filesystem::exists(offsets_file_)) {
+      try {
+        mapper_->start_from(RangeOffsets::load(offsets_file_));
+      } catch (const UserError& error) {
+        NODELET_ERROR("%s Until then nothing is kept in it.", error.what());
+        offsets_file_.clear();
+      }
+    }
     publisher_ = std::make_unique<LocalMapperPublisher>(node, config_.ros);
     listener_ = std::make_unique<tf2_ros::TransformListener>(tf_, node);
     diagnostics_ = std::make_unique<diagnostic_updater::Updater>(node, getPrivateNodeHandle(), getName());
@@ -51,7 +65,19 @@ class LocalMapperNodelet : public NodeletBase {
     timer_ = node.createWallTimer(ros::WallDuration(1.0), &LocalMapperNodelet::on_timer, this);
   }
 
-  void on_timer(const ros::WallTimerEvent&) { diagnostics_->force_update(); }
+  void on_timer(const ros::WallTimerEvent&) {
+    diagnostics_->force_update();
+    if (++seconds_ % kKeepEvery_s == 0) keep_range_offsets();
+  }
+
+  void keep_range_offsets() {
+    if (!mapper_ || offsets_file_.empty() || !config_.range_errors.learn) return;
+    try {
+      mapper_->range_offsets().save(offsets_file_);
+    } catch (const UserError& error) {
+      NODELET_ERROR_THROTTLE(600.0, "What was learned of the depth camera is not kept: %s", error.what());
+    }
+  }
 
   void on_odometry(const nav_msgs::OdometryConstPtr& message) {
     mapper_->add_odometry(message->header.stamp.toSec(), pose2_from(message->pose.pose));
@@ -172,6 +198,9 @@ class LocalMapperNodelet : public NodeletBase {
     status.add("readings that agree with the map", result.agree_fraction);
     status.add("readings behind the map's surfaces", result.see_through_fraction);
     status.add("observations in the map", result.observations);
+    const std::vector<double> offsets = mapper_->range_offsets().offset_per_m;
+    const auto [least, most] = std::minmax_element(offsets.begin(), offsets.end());
+    status.add("depth errors learned at 10 m %", 1000.0 * std::max(-*least, *most));
     status.add("cells reset by contradiction", mapper_->grid().cells_reset_by_contradiction());
     frames_ = 0;
     update_ms_ = publish_ms_ = longest_ms_ = 0.0;
@@ -188,9 +217,9 @@ class LocalMapperNodelet : public NodeletBase {
   std::deque<Pending> pending_;
   DepthProfile profile_buffer_;
   RangeScan scan_buffer_;
-  std::string transform_fault_;
+  std::string transform_fault_, offsets_file_;
   FrameOutcome last_outcome_ = FrameOutcome::kBadFrame;
-  int frames_ = 0, refused_ = 0, dropped_ = 0, no_transform_ = 0;
+  int seconds_ = 0, frames_ = 0, refused_ = 0, dropped_ = 0, no_transform_ = 0;
   double update_ms_ = 0.0, publish_ms_ = 0.0, longest_ms_ = 0.0;
   ros::WallTime last_frame_wall_;
 };

@@ -1,5 +1,7 @@
 #include "tsdf_local_mapper/sliding_window.h"
 
+#include <algorithm>
+
 namespace knav {
 
 TsdfObservation& SlidingWindow::scratch() {
@@ -39,6 +41,13 @@ void SlidingWindow::expire(TsdfGrid* grid, double clock_s, double travelled_m) {
     if (!old && !far) break;
     remove(grid, 0);
   }
+}
+
+int SlidingWindow::first_after(std::uint32_t sequence) const {
+  const auto found = std::partition_point(order_.begin(), order_.end(), [&](std::size_t slot) {
+    return slots_[slot]->observation.sequence <= sequence;
+  });
+  return static_cast<int>(found - order_.begin());
 }
 
 void SlidingWindow::clear() {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/tsdf_grid.h"
-#include "tsdf_local_mapper/local_mapper_config.h"
+#include "tsdf_local_mapper/window_config.h"
 
 namespace knav {
 
@@ -27,8 +27,12 @@ class SlidingWindow {
 
   std::uint32_t next_sequence() const { return next_sequence_; }
   int size() const { return static_cast<int>(order_.size()); }
-  /// The i-th oldest, for tests and pictures.
+  /// The i-th oldest.
   const TsdfObservation& at(int i) const { return slots_[order_[static_cast<std::size_t>(i)]]->observation; }
+  /// How far the robot had driven then.
+  double travelled_m(int i) const { return slots_[order_[static_cast<std::size_t>(i)]]->travelled_m; }
+  /// Index of the oldest observation newer than `sequence`; size() if there is none.
+  int first_after(std::uint32_t sequence) const;
 
  private:
   struct Slot {

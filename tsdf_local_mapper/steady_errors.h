@@ -13,14 +13,14 @@ namespace knav {
 
 /// What may be steadily wrong with odometry: wheels of another size, another distance between them, a skewed mount.
 struct SteadyErrorsConfig {
-  double memory_m = 2000.0;
+  double memory_m = 20000.0;
   double distance_scale_sd = 0.03;
   double turn_per_m_sd = 0.02;
   double turn_scale_sd = 0.05;
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.number("memory_m", memory_m, 0, 100000, "m",
+    v.number("memory_m", memory_m, 0, 1000000, "m",
              "Distance over which the errors may change; 0 = none is assumed.");
     v.number("distance_scale_sd", distance_scale_sd, 0, 0.5, "", "Distances are wrong by this share (sd).");
     v.number("turn_per_m_sd", turn_per_m_sd, 0, 1, "rad/m", "Driving straight on it turns this much (sd).");

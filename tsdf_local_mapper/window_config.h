@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+
+namespace knav {
+
+/// Which observations the map holds (paper section III.E: 120 s, 20 m).
+struct WindowConfig {
+  double duration_s = 120.0;
+  double distance_m = 20.0;
+  std::string clock = "moving";
+  int max_observations = 3600;
+  int parked_observations = 60;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.number("duration_s", duration_s, 1, 3600, "s", "An observation leaves the map after this long.");
+    v.number("distance_m", distance_m, 1, 200, "m", "An observation leaves after the robot drove this far.");
+    v.choice("clock", clock, {"paper", "moving"},
+             "What duration_s counts: all time, or only the time the robot moves (a parked robot keeps its "
+             "walls).");
+    v.integer("max_observations", max_observations, 10, 100000, "frames",
+              "The oldest leaves when there are more.");
+    v.integer("parked_observations", parked_observations, 1, 100000, "frames",
+              "While parked (clock: moving) only this many of the newest frames of that place are held.");
+  }
+};
+
+}  // namespace knav
