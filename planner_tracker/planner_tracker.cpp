@@ -104,6 +104,7 @@ Command PlannerTracker::step(double now_s, const RobotState& robot) { return sta
 const Failure& PlannerTracker::failure() const { return state_->failure; }
 const std::string& PlannerTracker::explanation() const { return state_->explanation; }
 const CombinedMap& PlannerTracker::map() const { return state_->map; }
+std::size_t PlannerTracker::plans() const { return state_->plans; }
 
 const std::vector<Point2>& PlannerTracker::path() const {
   state_->keeper.path().rest(&state_->shown_path);

@@ -88,6 +88,7 @@ struct PlannerTracker::State {
   double lost_since_s = -1.0, found_since_s = -1.0, turned_rad = 0.0, last_yaw_rad = 0.0;
   bool lost_turn_done = false;
   Pose2 T_odom_lost;
+  std::size_t plans = 0;
   PlanResult asked;  ///< for make_plan
 };
 

@@ -167,6 +167,7 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
   if (now_s < next_plan_s) return false;
   next_plan_s = now_s + 1.0 / config.planner_frequency - 0.5 / config.controller_frequency;
   const bool first = goal_allowed_s > 1e8;
+  ++plans;
   outcome = keeper.replan(map, position(robot.T_map_base), position(goal));
   using Outcome = PlanKeeper::Outcome;
   // There was a way to this goal before: it is where the robot stands that has none.
