@@ -116,7 +116,7 @@ class GoalMaker {
       const auto distance_to = [&](const Point2& p) { return footprint_distance_m(s, p); };
       if (s.material == Material::kGlass) {
         add("glass", distance_to);
-      } else if (s.bottom_m < 0.02 && s.top_m < 0.13) {
+      } else if (s.bottom_m < 0.02 && s.top_m > 0.02 && s.top_m < 0.13) {
         add("low box", distance_to);
       } else if (s.bottom_m > 0.4 && s.top_m < 1.0 && s.material != Material::kWall) {
         add("table edge", distance_to);

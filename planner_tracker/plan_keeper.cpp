@@ -11,6 +11,7 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// Farther from the old path than this, the robot is on another.
 constexpr double kOffPath_m = 0.5;
 constexpr double kNearestLook_m = 0.25;
+constexpr double kBeginning_m = 0.5;  ///< of a path, for its direction
 constexpr double kStandsBefore_m = 0.6;  ///< what closes a way may reach this far before the point where it does
 constexpr int kDirections = 24;
 constexpr int kMostTried = 4;
@@ -21,7 +22,7 @@ PlanKeeper::PlanKeeper(const PlannerTrackerConfig& config) : config_(config), pl
 
 void PlanKeeper::set_map(const CombinedMap& map) {
   planner_.set_map(map.global());
-  path_.clear();
+  start_goal();
 }
 
 void PlanKeeper::take(const std::vector<Point2>& path) {
@@ -30,18 +31,40 @@ void PlanKeeper::take(const std::vector<Point2>& path) {
   ++switches_;
 }
 
-double PlanKeeper::old_cost_m(const MapLayer& layer, const Point2& robot) {
-  if (path_.empty()) return kInfinite;
-  path_.advance(robot);
-  if (path_.offset_m() > kOffPath_m) return kInfinite;
-  path_.rest(&rest_);
-  double cost = path_.offset_m();
+double PlanKeeper::old_cost_m(const MapLayer& layer, Path* path, const Point2& robot) {
+  if (path->empty()) return kInfinite;
+  path->advance(robot);
+  if (path->offset_m() > kOffPath_m) return kInfinite;
+  path->rest(&rest_);
+  double cost = path->offset_m();
   for (std::size_t i = 1; i < rest_.size(); ++i) {
     cost += planner_.segment_cost_m(layer, rest_[i - 1], rest_[i]);
     // The cells the robot stands in may be closed: it is on its way out of them.
-    if (!std::isfinite(cost) && i == 1 && !planner_.open(layer, rest_[0])) cost = path_.remaining_m();
+    if (!std::isfinite(cost) && i == 1 && !planner_.open(layer, rest_[0])) cost = path->remaining_m();
   }
   return cost;
+}
+
+double PlanKeeper::turning_cost_m(const Path& path, const Pose2& robot) const {
+  if (path.remaining_m() < kBeginning_m) return 0.0;
+  const Point2 p = robot.inverse() * path.point_at(path.at_m() + kBeginning_m);
+  return std::abs(std::atan2(p.y_m, p.x_m)) / config_.max_vel_theta * config_.max_vel_x;
+}
+
+bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s) {
+  const bool first = held_since_s_ < 0.0;
+  if (first) held_ = path_;
+  held_.advance(robot);
+  const bool detour = result_.cost_m > held_.remaining_m() + config_.planning.hold_detour_m;
+  if (held_.empty() || held_.offset_m() > kOffPath_m || !detour) return false;
+  if (first) held_since_s_ = now_s;
+  if (now_s - held_since_s_ > config_.planning.hold_s) return false;
+  std::vector<Point2> way;
+  held_.rest(&way);
+  if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), &way)) return false;
+  path_.set(way);
+  path_kind_ = Outcome::kToBlockage;
+  return true;
 }
 
 bool PlanKeeper::cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, std::vector<Point2>* way) {
@@ -99,8 +122,9 @@ bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, c
   return false;
 }
 
-PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Point2& robot, const Point2& goal) {
+PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robot, const Point2& goal, double now_s) {
   switched_ = false;
+  const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
   const MapLayer& layer = map.combined();
   Outcome kind = Outcome::kToGoal;
   planner_.plan(layer, robot, goal, &result_);
@@ -117,17 +141,28 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Point2& robot, co
     }
   }
   if (result_.code == PlanCode::kOk) {
-    const double old = path_kind_ == kind ? old_cost_m(layer, robot) : kInfinite;
+    if (holding() && kind == Outcome::kToGoal && std::isfinite(old_cost_m(layer, &held_, robot))) {
+      // Open again: on as before.
+      path_ = held_;
+      path_kind_ = kind;
+    }
+    const double old = path_kind_ == kind ? old_cost_m(layer, &path_, robot) : kInfinite;
+    const bool was_to_goal = kind == Outcome::kToGoal && (holding() || (path_kind_ == kind && !path_.empty()));
+    if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s)) return Outcome::kToBlockage;
+    held_since_s_ = -1.0;
     const bool same_end =
         !path_.empty() && !result_.path.empty() &&
         std::hypot(path_.end().x_m - result_.path.back().x_m, path_.end().y_m - result_.path.back().y_m) <
             (kind == Outcome::kToGoal ? 0.01 : 0.3);
-    const bool clearly_better = result_.cost_m < old * (1.0 - config_.planning.switch_gain) &&
-                                result_.cost_m < old - config_.planning.switch_gain_m;
+    tried_.set(result_.path);
+    const double now_cost = old + turning_cost_m(path_, T_map_robot), new_cost = result_.cost_m + turning_cost_m(tried_, T_map_robot);
+    const bool clearly_better = new_cost < now_cost * (1.0 - config_.planning.switch_gain) &&
+                                new_cost < now_cost - config_.planning.switch_gain_m;
     if (!same_end || !std::isfinite(old) || clearly_better) take(result_.path);
     path_kind_ = kind;
     return kind;
   }
+  held_since_s_ = -1.0;
   if (result_.code == PlanCode::kStartBlocked) {
     at_ = result_.at;
     path_.clear();
@@ -147,7 +182,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Point2& robot, co
     return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < config_.planning.too_near_m();
   };
   const bool robot_too_near = too_near(robot);
-  const bool keep = path_kind_ == Outcome::kToBlockage && std::isfinite(old_cost_m(layer, robot)) &&
+  const bool keep = path_kind_ == Outcome::kToBlockage && std::isfinite(old_cost_m(layer, &path_, robot)) &&
                     !(robot_too_near && too_near(path_.end()));
   if (!keep) {
     if (robot_too_near) way_to_look(layer, unchanged, robot, &way);

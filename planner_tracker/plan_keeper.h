@@ -29,8 +29,15 @@ class PlanKeeper {
   explicit PlanKeeper(const PlannerTrackerConfig& config);
 
   void set_map(const CombinedMap& map);
-  void start_goal() { path_.clear(); }
-  Outcome replan(CombinedMap& map, const Point2& robot, const Point2& goal);
+  void start_goal() {
+    path_.clear();
+    held_.clear();
+    held_since_s_ = -1.0;
+  }
+  Outcome replan(CombinedMap& map, const Pose2& robot, const Point2& goal, double now_s);
+  /// True if the way that is closed was open a moment ago and is expected to be again: the outcome is kToBlockage, though there
+  /// is a way round.
+  bool holding() const { return held_since_s_ >= 0.0; }
   /// True if the last replan() replaced the path by another.
   bool switched() const { return switched_; }
   int switches() const { return switches_; }
@@ -41,7 +48,11 @@ class PlanKeeper {
   GridPlanner& planner() { return planner_; }
 
  private:
-  double old_cost_m(const MapLayer& layer, const Point2& robot);
+  double old_cost_m(const MapLayer& layer, Path* path, const Point2& robot);
+  /// What it costs to turn towards a path's beginning: the metres the robot could have driven meanwhile.
+  double turning_cost_m(const Path& path, const Pose2& robot) const;
+  /// True if the way round is to be left alone for now.
+  bool hold(CombinedMap& map, const Point2& robot, double now_s);
   void take(const std::vector<Point2>& path);
   /// Finds where the layer closes a way of the unchanged map (at_), and keeps the way's beginning up to where the robot
   /// can look at that from look_distance_m, or nearer where corners hide it. False if the layer does not close it.
@@ -55,6 +66,8 @@ class PlanKeeper {
   Outcome path_kind_ = Outcome::kToGoal;
   PlanResult result_;
   std::vector<Point2> rest_;
+  Path held_, tried_;
+  double held_since_s_ = -1.0;
   Point2 at_;
   bool switched_ = false;
   int switches_ = 0;

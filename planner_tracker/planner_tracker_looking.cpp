@@ -24,8 +24,9 @@ bool PlannerTracker::State::looking(double now_s, const RobotState& robot) {
   const bool arrived = path.remaining_m() + path.offset_m() < kArrived_m;
   const bool in_view = closed && distance < config.planning.look_distance_m + kArrived_m &&
                        tracker.straight_free_m(input, bearing, distance) > distance - kStandsBefore_m;
-  if (in_view && backing_up(now_s, robot, keeper.at())) return true;
-  if (!arrived && (!in_view || distance < config.planning.too_near_m())) return false;
+  const bool holding = keeper.holding();
+  if (in_view && !holding && backing_up(now_s, robot, keeper.at())) return true;
+  if (!arrived && (!in_view || (!holding && distance < config.planning.too_near_m()))) return false;
   if (looking_since_s < 0.0) looking_since_s = now_s;
   act(Activity::kWaiting, std::abs(bearing) > kFacing_rad ? tracker.turn(input, bearing) : tracker.stop(input));
   return true;
@@ -59,7 +60,7 @@ bool PlannerTracker::State::backing_up(double now_s, const RobotState& robot, co
     return false;
   }
   const double behind_m =
-      std::min(scan.free_m(kPi, tracker.stop_radius_m(), false), just_driven_behind_m(robot.T_odom_base));
+      std::min(scan.free_m(kPi, tracker.safe_radius_m(), false), just_driven_behind_m(robot.T_odom_base));
   if (behind_m < (moving ? 0.1 : kFreeBehind_m)) return false;
   if (near_since_s < 0.0) near_since_s = now_s;
   if (now_s - near_since_s < config.planning.back_up_after_s) {

@@ -4,6 +4,7 @@
 
 #include "core/pose_buffer.h"
 #include "planner_tracker/goal_watch.h"
+#include "planner_tracker/moving_cells.h"
 #include "planner_tracker/path_tracker.h"
 #include "planner_tracker/plan_keeper.h"
 #include "planner_tracker/planner_tracker.h"
@@ -58,6 +59,7 @@ struct PlannerTracker::State {
 
   PlannerTrackerConfig config;
   CombinedMap map;
+  MovingCells moving;
   PlanKeeper keeper;
   PathTracker tracker;
   RandomMoves moves;

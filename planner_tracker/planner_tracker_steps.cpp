@@ -62,7 +62,7 @@ bool PlannerTracker::State::stopped_by_missing_data(double now_s, const RobotSta
 
 double PlannerTracker::State::free_way(const RobotState&, double bearing_rad, bool localized) const {
   constexpr double kFar_m = 1.5;
-  const double radius = tracker.stop_radius_m();
+  const double radius = tracker.safe_radius_m();
   if (localized) {
     // By scan and map together, as far as the footprint goes; known only.
     return tracker.straight_free_m(input, bearing_rad, kFar_m);
@@ -108,7 +108,14 @@ bool PlannerTracker::State::stopped_by_lost(double now_s, const RobotState& robo
   if (!lost_turn_done && std::abs(turned_rad) < 2.0 * kPi) {
     TrackOutput turn = tracker.stop(input);
     const double step = config.acc_lim_theta * input.dt_s;
-    if (std::abs(turn.v_mps) < 0.01) {
+    TrackInput scan_only = input;
+    scan_only.layer = nullptr;
+    constexpr double kAhead_rad = 0.3;
+    if (tracker.turn_free_rad(scan_only, 1.0, kAhead_rad) < kAhead_rad) {
+      // A corner of the footprint is in the way: a look from elsewhere then.
+      lost_turn_done = true;
+      moves.start(3);
+    } else if (std::abs(turn.v_mps) < 0.01) {
       turn.w_radps = std::clamp(config.recovery.lost_turn_radps, input.w_radps - step, input.w_radps + step);
     }
     act(Activity::kLostTurning, turn);
@@ -158,8 +165,16 @@ bool PlannerTracker::State::arrived(const RobotState& robot) {
     command.finished = true;
     return true;
   }
-  act(Activity::kAligning,
-      std::abs(error) < 0.5 * config.yaw_goal_tolerance ? tracker.stop(input) : tracker.turn(input, error));
+  const TrackOutput turn = std::abs(error) < 0.5 * config.yaw_goal_tolerance ? tracker.stop(input) : tracker.turn(input, error);
+  if (turn.kind != TrackOutput::Kind::kBlocked) {
+    blocked_since_s = -1.0;
+  } else if (blocked_since_s < 0.0) {
+    blocked_since_s = last_step_s;
+  } else if (last_step_s - blocked_since_s > config.planning.blocked_timeout_s) {
+    fail(FailureCode::kBlocked, position(robot.T_map_base), "The robot stands at the goal but has no room to turn to its heading.");
+    return true;
+  }
+  act(Activity::kAligning, turn);
   return true;
 }
 
@@ -168,7 +183,7 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
   next_plan_s = now_s + 1.0 / config.planner_frequency - 0.5 / config.controller_frequency;
   const bool first = goal_allowed_s > 1e8;
   ++plans;
-  outcome = keeper.replan(map, position(robot.T_map_base), position(goal));
+  outcome = keeper.replan(map, robot.T_map_base, position(goal), now_s);
   using Outcome = PlanKeeper::Outcome;
   // There was a way to this goal before: it is where the robot stands that has none.
   if (outcome == Outcome::kNoPath && !first) outcome = Outcome::kStartBlocked;
@@ -181,8 +196,10 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
       explain("Something stands on the goal; going near it.");
       break;
     case Outcome::kToBlockage:
-      next_plan_s = now_s + kFailedPlanWait_s;
-      explanation = fmt::format("The way is closed at ({:.2f}, {:.2f}) m.", at.x_m, at.y_m);
+      if (!keeper.holding()) next_plan_s = now_s + kFailedPlanWait_s;
+      explanation = fmt::format(keeper.holding() ? "Something has come into the way at ({:.2f}, {:.2f}) m; it may move on."
+                                                 : "The way is closed at ({:.2f}, {:.2f}) m.",
+                                at.x_m, at.y_m);
       break;
     case Outcome::kGoalOccupied:
       fail(
@@ -288,7 +305,7 @@ void PlannerTracker::State::drive(double now_s, const RobotState& robot) {
     // A goal just overshot, straight behind: back up over what was just driven, if it is still seen free.
     const Point2 p = robot.T_map_base.inverse() * position(goal);
     if (p.x_m < -0.02 && std::abs(p.y_m) < 0.3 * std::abs(p.x_m) &&
-        scan.free_m(kPi, tracker.stop_radius_m(), true) > -p.x_m + 0.05) {
+        scan.free_m(kPi, tracker.safe_radius_m(), true) > -p.x_m + 0.05) {
       const TrackOutput back = tracker.creep(input, p.x_m);
       if (back.kind != TrackOutput::Kind::kBlocked) {
         act(Activity::kDriving, back);
