@@ -34,6 +34,7 @@ nlohmann::json identity(const GoalSessionOptions& o) {
   return {{"world", o.world},
           {"world_text", text(o.world)},
           {"tour_text", text(o.tour)},
+          {"map", o.map},
           {"config", o.config},
           {"config_text", text(o.config)},
           {"calibration_text", text(o.calibration)},
@@ -92,7 +93,11 @@ std::string GoalSession::stem(std::size_t run) const { return fmt::format("{}/ru
 
 void GoalSession::map(const SessionProgress& progress) {
   const std::string folder = options_.out + "/map", file = options_.out + "/suite.json";
-  if (!is_map_directory(folder)) {
+  if (!is_map_directory(folder) && !options_.map.empty()) {
+    MapDirectory made = load_map(options_.map);
+    paint_keepout(setup_.world, T_world_map_, &made);
+    save_map(folder, made, true);
+  } else if (!is_map_directory(folder)) {
     std::vector<Waypoint> none;
     BuiltMap built = map_world(setup_, &none, [&](const std::string& stage, double fraction) {
       progress(stage, fraction, fmt::format("{:.0f} m", setup_.tour.length_m()));

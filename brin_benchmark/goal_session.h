@@ -11,7 +11,7 @@
 namespace knav {
 
 struct GoalSessionOptions {
-  std::string world, tour, config, calibration, out;
+  std::string world, tour, map, config, calibration, out;
   std::string sensor = "calibrated", odometry = "default";
   GoalSuiteConfig suite;
   int run = 0;  ///< counted from 1; 0 = all
@@ -19,7 +19,7 @@ struct GoalSessionOptions {
   int jobs = 1;
 };
 
-/// Goals in one building, in a folder: the map first, then the goals, then the runs, each written whole when it ends.
+/// Goals in one building, in a folder: the map first (driven, or `map` taken over), then the goals, then the runs, each written whole when it ends.
 ///
 ///   setup.json                      what it is of; another one is refused
 ///   map/, suite.json                of the mapping drive (keepout painted in), and the goals that were drawn

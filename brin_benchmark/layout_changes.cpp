@@ -200,8 +200,8 @@ class RunMaker {
     std::string text;
     for (int i = 0, attempt = 0; i < count && attempt < 50 * count; ++attempt) {
       Point2 from = open_[pick(open_.size())], to = open_[pick(open_.size())];
-      // Half of them have business on the robot's way.
-      if (!crowd && i % 2 == 0 && !on_the_way(&from)) continue;
+      // Half of them have business on the robot's way, if there is a place for it.
+      if (!crowd && i % 2 == 0 && attempt < 25 * count && !on_the_way(&from)) continue;
       const double distance = distance_m(from, to);
       const Point2 start{world_.spawn.x_m, world_.spawn.y_m};
       if (std::min(distance_m(from, start), distance_m(to, start)) < kFreeStart_m) continue;

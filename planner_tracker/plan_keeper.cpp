@@ -11,6 +11,8 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// Farther from the old path than this, the robot is on another.
 constexpr double kOffPath_m = 0.5;
 constexpr double kNearestLook_m = 0.25;
+constexpr double kAsGood_m = 0.15;       ///< so much farther off is as good a place to look from
+constexpr double kElsewhere_m = 0.6;     ///< another place to look from is this far from the last at least
 constexpr double kBeginning_m = 0.5;  ///< of a path, for its direction
 constexpr double kStandsBefore_m = 0.6;  ///< what closes a way may reach this far before the point where it does
 constexpr int kDirections = 24;
@@ -97,7 +99,12 @@ bool PlanKeeper::cut_at_blockage(const MapLayer& layer, const MapLayer& unchange
   return false;
 }
 
-bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot,
+bool PlanKeeper::looks_at_it(const MapLayer& unchanged, const Point2& from) const {
+  const double away_m = std::hypot(from.x_m - at_.x_m, from.y_m - at_.y_m);
+  return away_m < config_.planning.look_distance_m + kAsGood_m && std::isfinite(planner_.segment_cost_m(unchanged, from, at_));
+}
+
+bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, double beyond_m,
                              std::vector<Point2>* way) {
   std::vector<Point2> places;
   for (const double share : {1.0, 1.25}) {
@@ -112,6 +119,7 @@ bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, c
     }
   }
   const auto away_m = [&](const Point2& p) { return std::hypot(p.x_m - robot.x_m, p.y_m - robot.y_m); };
+  places.erase(std::remove_if(places.begin(), places.end(), [&](const Point2& p) { return away_m(p) < beyond_m; }), places.end());
   std::sort(places.begin(), places.end(), [&](const Point2& a, const Point2& b) { return away_m(a) < away_m(b); });
   for (std::size_t i = 0; i < std::min<std::size_t>(kMostTried, places.size()); ++i) {
     planner_.plan(layer, robot, places[i], &result_);
@@ -150,6 +158,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     const bool was_to_goal = kind == Outcome::kToGoal && (holding() || (path_kind_ == kind && !path_.empty()));
     if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s)) return Outcome::kToBlockage;
     held_since_s_ = -1.0;
+    elsewhere_ = look_elsewhere_ = false;
     const bool same_end =
         !path_.empty() && !result_.path.empty() &&
         std::hypot(path_.end().x_m - result_.path.back().x_m, path_.end().y_m - result_.path.back().y_m) <
@@ -182,10 +191,17 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < config_.planning.too_near_m();
   };
   const bool robot_too_near = too_near(robot);
-  const bool keep = path_kind_ == Outcome::kToBlockage && std::isfinite(old_cost_m(layer, &path_, robot)) &&
-                    !(robot_too_near && too_near(path_.end()));
+  // What closes the way may be elsewhere than it seemed from afar: then it is looked at from elsewhere, too.
+  const bool keep = path_kind_ == Outcome::kToBlockage && !look_elsewhere_ && std::isfinite(old_cost_m(layer, &path_, robot)) &&
+                    (elsewhere_ || looks_at_it(unchanged, path_.end())) && !(robot_too_near && too_near(path_.end()));
   if (!keep) {
-    if (robot_too_near) way_to_look(layer, unchanged, robot, &way);
+    elsewhere_ = false;
+    if (look_elsewhere_) {
+      elsewhere_ = way_to_look(layer, unchanged, robot, kElsewhere_m, &way);
+    } else if (robot_too_near) {
+      way_to_look(layer, unchanged, robot, 0.0, &way);
+    }
+    look_elsewhere_ = false;
     take(way);
   }
   path_kind_ = Outcome::kToBlockage;

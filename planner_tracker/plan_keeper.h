@@ -33,11 +33,16 @@ class PlanKeeper {
     path_.clear();
     held_.clear();
     held_since_s_ = -1.0;
+    elsewhere_ = look_elsewhere_ = false;
   }
   Outcome replan(CombinedMap& map, const Pose2& robot, const Point2& goal, double now_s);
   /// True if the way that is closed was open a moment ago and is expected to be again: the outcome is kToBlockage, though there
   /// is a way round.
   bool holding() const { return held_since_s_ >= 0.0; }
+  /// Where the robot looks at a closed way from has shown it nothing new: the next replan() leads it to another place.
+  void look_elsewhere() { look_elsewhere_ = true; }
+  /// True while path() leads from one place to look at a closed way from to another.
+  bool elsewhere() const { return elsewhere_; }
   /// True if the last replan() replaced the path by another.
   bool switched() const { return switched_; }
   int switches() const { return switches_; }
@@ -57,8 +62,11 @@ class PlanKeeper {
   /// Finds where the layer closes a way of the unchanged map (at_), and keeps the way's beginning up to where the robot
   /// can look at that from look_distance_m, or nearer where corners hide it. False if the layer does not close it.
   bool cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, std::vector<Point2>* way);
-  /// A way to the nearest place from which the blockage can be looked at, for a robot that stands too near to it.
-  bool way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, std::vector<Point2>* way);
+  /// A way to the nearest place from which the blockage can be looked at and that is farther than `beyond_m`, for a robot that
+  /// stands too near to it or has seen nothing from where it stands.
+  bool way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, double beyond_m, std::vector<Point2>* way);
+  /// True if the blockage can be looked at from there.
+  bool looks_at_it(const MapLayer& unchanged, const Point2& from) const;
 
   PlannerTrackerConfig config_;
   GridPlanner planner_;
@@ -68,6 +76,7 @@ class PlanKeeper {
   std::vector<Point2> rest_;
   Path held_, tried_;
   double held_since_s_ = -1.0;
+  bool look_elsewhere_ = false, elsewhere_ = false;
   Point2 at_;
   bool switched_ = false;
   int switches_ = 0;

@@ -73,6 +73,27 @@ TEST(ClosedWay, TheRobotBacksUpFromSomebodyWithItsEyesOnHimUntilHeIsGone) {
   EXPECT_LE(world.reversals, 2) << "back once, and on";
 }
 
+TEST(ClosedWay, IsLookedAtFromElsewhereIfNothingIsSeenFromHereAndGivenUpInTimeAllTheSame) {
+  // A door that is shut, seen from a room: the robot looks from two places at least, and does not go on like that for ever.
+  ToyWorld world(two_rooms(false), two_rooms(true), {1.5, 3.0, 0.0});
+  world.planner.set_goal({10.0, 3.0, 0.0});
+  const double began_s = world.now_s;
+  std::vector<Point2> stood;
+  Command command;
+  for (int i = 0; i < 2400 && !command.finished; ++i) {
+    command = world.step();
+    const Point2 p{world.T_map_base.x_m, world.T_map_base.y_m};
+    if (command.activity != Activity::kWaiting || std::abs(world.v_mps) > 0.01) continue;
+    if (stood.empty() || distance(stood.back(), p) > 0.4) stood.push_back(p);
+  }
+  ASSERT_EQ(command.activity, Activity::kFailed);
+  EXPECT_EQ(world.planner.failure().code, FailureCode::kBlocked);
+  EXPECT_NEAR(world.planner.failure().at.x_m, 5.7, 0.3);
+  EXPECT_GE(stood.size(), 2u);
+  EXPECT_LT(world.now_s - began_s, 60.0);
+  EXPECT_EQ(world.collisions, 0);
+}
+
 /// A corridor, and a way round it that is 10 m longer.
 OccupancyGrid corridor_and_detour() {
   OccupancyGrid grid = room(14.0, 6.0);
