@@ -11,6 +11,9 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// Farther from the old path than this, the robot is on another.
 constexpr double kOffPath_m = 0.5;
 constexpr double kNearestLook_m = 0.25;
+constexpr double kClosedRound_m = 0.6;   ///< what closes a way there belongs together
+constexpr double kSamePlace_m = 1.0;
+constexpr int kEnoughLooks = 2;
 constexpr double kAsGood_m = 0.15;       ///< so much farther off is as good a place to look from
 constexpr double kElsewhere_m = 0.6;     ///< another place to look from is this far from the last at least
 constexpr double kBeginning_m = 0.5;  ///< of a path, for its direction
@@ -130,6 +133,16 @@ bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, c
   return false;
 }
 
+const MapLayer& PlanKeeper::plan_unchanged(CombinedMap& map, const Point2& robot, const Point2& goal) {
+  const MapLayer* unchanged = &map.permissive(closed_, kClosedRound_m);
+  planner_.plan(*unchanged, robot, goal, &result_);
+  if (result_.code != PlanCode::kOk && !closed_.empty()) {
+    unchanged = &map.permissive();
+    planner_.plan(*unchanged, robot, goal, &result_);
+  }
+  return *unchanged;
+}
+
 PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robot, const Point2& goal, double now_s) {
   switched_ = false;
   const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
@@ -178,8 +191,14 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     return Outcome::kStartBlocked;
   }
   // No way now. Would there be one, and where is it closed?
-  const MapLayer& unchanged = map.permissive();
-  planner_.plan(unchanged, robot, goal, &result_);
+  if (look_elsewhere_ && ++looks_ >= kEnoughLooks) {
+    looks_ = 0;
+    closed_.push_back(at_);
+    // Another way to be looked at? If not, back to this one, from where it was not looked at last.
+    look_elsewhere_ = false;
+    path_.clear();
+  }
+  const MapLayer& unchanged = plan_unchanged(map, robot, goal);
   if (result_.code != PlanCode::kOk) {
     at_ = result_.at;
     path_.clear();
@@ -187,6 +206,9 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
   }
   std::vector<Point2> way = result_.path;
   if (!cut_at_blockage(layer, unchanged, &way)) at_ = goal;
+  const auto same_place = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kSamePlace_m; };
+  if (!same_place(last_at_)) looks_ = 0;
+  last_at_ = at_;
   const auto too_near = [&](const Point2& p) {
     return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < config_.planning.too_near_m();
   };
@@ -202,6 +224,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
       way_to_look(layer, unchanged, robot, 0.0, &way);
     }
     look_elsewhere_ = false;
+    elsewhere_ = elsewhere_ || std::any_of(closed_.begin(), closed_.end(), same_place);
     take(way);
   }
   path_kind_ = Outcome::kToBlockage;

@@ -34,14 +34,17 @@ class PlanKeeper {
     held_.clear();
     held_since_s_ = -1.0;
     elsewhere_ = look_elsewhere_ = false;
+    looks_ = 0;
+    closed_.clear();
   }
   Outcome replan(CombinedMap& map, const Pose2& robot, const Point2& goal, double now_s);
   /// True if the way that is closed was open a moment ago and is expected to be again: the outcome is kToBlockage, though there
   /// is a way round.
   bool holding() const { return held_since_s_ >= 0.0; }
-  /// Where the robot looks at a closed way from has shown it nothing new: the next replan() leads it to another place.
+  /// Where the robot looks at a closed way from has shown it nothing new: the next replan() leads it to another place, and after
+  /// that to another way, if there is one: what closes that one may be gone when it is looked at.
   void look_elsewhere() { look_elsewhere_ = true; }
-  /// True while path() leads from one place to look at a closed way from to another.
+  /// True while path() leads from one place to look at a closed way from to another, or back to one already looked at.
   bool elsewhere() const { return elsewhere_; }
   /// True if the last replan() replaced the path by another.
   bool switched() const { return switched_; }
@@ -65,6 +68,8 @@ class PlanKeeper {
   /// A way to the nearest place from which the blockage can be looked at and that is farther than `beyond_m`, for a robot that
   /// stands too near to it or has seen nothing from where it stands.
   bool way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, double beyond_m, std::vector<Point2>* way);
+  /// The unchanged map's best way that avoids what was looked at; the best of all if there is none.
+  const MapLayer& plan_unchanged(CombinedMap& map, const Point2& robot, const Point2& goal);
   /// True if the blockage can be looked at from there.
   bool looks_at_it(const MapLayer& unchanged, const Point2& from) const;
 
@@ -77,6 +82,9 @@ class PlanKeeper {
   Path held_, tried_;
   double held_since_s_ = -1.0;
   bool look_elsewhere_ = false, elsewhere_ = false;
+  int looks_ = 0;                ///< at the present blockage, in vain
+  Point2 last_at_;
+  std::vector<Point2> closed_;   ///< looked at on the way to this goal, and closed
   Point2 at_;
   bool switched_ = false;
   int switches_ = 0;

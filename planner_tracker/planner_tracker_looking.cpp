@@ -26,6 +26,8 @@ bool PlannerTracker::State::looking(double now_s, const RobotState& robot) {
   const bool in_view = closed && distance < config.planning.look_distance_m + kArrived_m &&
                        tracker.straight_free_m(input, bearing, distance) > distance - kStandsBefore_m;
   const bool holding = keeper.holding();
+  // On its way to another place to look from: it has seen all there is to see from here.
+  if (keeper.elsewhere() && !arrived) return false;
   if (in_view && !holding && backing_up(now_s, robot, keeper.at())) return true;
   if (!arrived && (!in_view || (!holding && distance < config.planning.too_near_m()))) return false;
   if (looking_since_s < 0.0) looking_since_s = now_s;

@@ -94,6 +94,24 @@ TEST(ClosedWay, IsLookedAtFromElsewhereIfNothingIsSeenFromHereAndGivenUpInTimeAl
   EXPECT_EQ(world.collisions, 0);
 }
 
+TEST(ClosedWay, WhenEveryWaySeemsClosedTheNextOneIsLookedAtAfterTheNearest) {
+  // Two doors. The nearer is shut. Before the farther somebody stood when the robot last saw it, and has left since.
+  OccupancyGrid map = room(12.0, 6.0);
+  fill(&map, 5.95, 0.0, 6.05, 6.0, 100);
+  fill(&map, 5.95, 0.6, 6.05, 1.5, 0);
+  fill(&map, 5.95, 4.5, 6.05, 5.4, 0);
+  OccupancyGrid truth = map;
+  fill(&truth, 5.95, 0.6, 6.05, 1.5, 100);
+  ToyWorld world(truth, map, {2.5, 3.4, 0.6}, {});
+  const double began_s = world.now_s;
+  world.discs.push_back({[=](double t) { return t - began_s < 2.5 ? Point2{5.7, 4.95} : Point2{-5.0, 0.0}; }});
+  for (int i = 0; i < 40; ++i) world.step();
+  world.sees_free_from_m = 1.3;
+  world.planner.set_goal({10.0, 1.0, 0.0});
+  EXPECT_EQ(world.run(120.0).activity, Activity::kReached) << world.planner.failure().reason;
+  EXPECT_EQ(world.collisions, 0);
+}
+
 /// A corridor, and a way round it that is 10 m longer.
 OccupancyGrid corridor_and_detour() {
   OccupancyGrid grid = room(14.0, 6.0);
