@@ -148,6 +148,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
   const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
   const MapLayer& layer = map.combined();
   Outcome kind = Outcome::kToGoal;
+  Point2 nearby;
   planner_.plan(layer, robot, goal, &result_);
   if (result_.code == PlanCode::kGoalOccupied || result_.code == PlanCode::kGoalUnknown) {
     at_ = result_.at;
@@ -155,11 +156,24 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
       path_.clear();
       return result_.code == PlanCode::kGoalOccupied ? Outcome::kGoalOccupied : Outcome::kGoalUnknown;
     }
-    Point2 nearby;
     if (planner_.nearest_open(layer, goal, config_.planning.goal_snap_m, &nearby)) {
       kind = Outcome::kToNearby;
       planner_.plan(layer, robot, nearby, &result_);
     }
+  }
+  if (result_.code == PlanCode::kOk && kind == Outcome::kToNearby) {
+    // Right beside it the floor under it is out of sight: whether it has gone is seen from farther off.
+    std::vector<Point2> way;
+    if (look_elsewhere_ && way_to_look(layer, map.global(), robot, kElsewhere_m, &way)) {
+      elsewhere_ = true;
+      take(way);
+    }
+    look_elsewhere_ = false;
+    if (elsewhere_ && std::isfinite(old_cost_m(layer, &path_, robot))) {
+      path_kind_ = kind;
+      return kind;
+    }
+    planner_.plan(layer, robot, nearby, &result_);
   }
   if (result_.code == PlanCode::kOk) {
     if (holding() && kind == Outcome::kToGoal && std::isfinite(old_cost_m(layer, &held_, robot))) {

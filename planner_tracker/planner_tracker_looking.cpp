@@ -11,7 +11,7 @@ constexpr double kArrived_m = 0.15;
 constexpr double kFacing_rad = 0.2;
 constexpr double kStandsBefore_m = 0.8;    ///< what closes the way, and the robot's radius, reach this far before the point
 constexpr double kEnoughFarther_m = 0.15;  ///< less is not worth backing up for
-constexpr double kLongEnough_s = 7.0;      ///< looked from one place
+constexpr double kLongEnough_s = 5.0;      ///< looked from one place
 constexpr double kFreeBehind_m = 0.25;
 constexpr double kJustDriven_s = 12.0, kBesideTrack_m = 0.1;
 
@@ -31,7 +31,7 @@ bool PlannerTracker::State::looking(double now_s, const RobotState& robot) {
   if (in_view && !holding && backing_up(now_s, robot, keeper.at())) return true;
   if (!arrived && (!in_view || (!holding && distance < config.planning.too_near_m()))) return false;
   if (looking_since_s < 0.0) looking_since_s = now_s;
-  if (closed && !holding && now_s - looking_since_s > kLongEnough_s) {
+  if ((closed || outcome == PlanKeeper::Outcome::kToNearby) && !holding && now_s - looking_since_s > kLongEnough_s) {
     // Nothing new from here: what hides the place from here may not hide it from there.
     keeper.look_elsewhere();
     next_plan_s = now_s;
