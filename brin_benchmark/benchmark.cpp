@@ -7,14 +7,14 @@
 #include <cmath>
 #include <limits>
 
+#include "brin_benchmark/closed_loop.h"
+#include "brin_benchmark/ticker.h"
 #include "core/error.h"
 
 namespace knav {
 namespace {
 
 constexpr double kOdometryPeriod_s = 0.02;
-constexpr double kControlPeriod_s = 0.05;
-constexpr double kTrackPeriod_s = 0.1;
 
 /// What the benchmark allows for a leg: an honest pace of 0.2 m/s along a way twice the straight one, and a
 /// minute.
@@ -30,125 +30,6 @@ using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
-
-/// True once per period of simulated time.
-class Ticker {
- public:
-  explicit Ticker(double period_s) : period_s_(period_s) {}
-  bool due(double now_s) {
-    if (now_s < next_s_ - 1e-9) return false;
-    next_s_ = std::max(next_s_ + period_s_, now_s);
-    return true;
-  }
-
- private:
-  double period_s_;
-  double next_s_ = 0.0;
-};
-
-/// The robot, its stack and the building, advanced together.
-class ClosedLoop {
- public:
-  ClosedLoop(const BenchmarkSetup& setup, const WorldConfig& world, const MapDirectory& map,
-             RunRecord* record, FlightRecorder* recorder)
-      : simulator_(world, setup.simulator), stack_(setup.stack), record_(record), recorder_(recorder) {
-    stack_.set_map(map);
-  }
-
-  Simulator& simulator() { return simulator_; }
-  NavigationStack& stack() { return stack_; }
-  double now_s() const { return simulator_.stamp_s(); }
-
-  /// One physics step, with all that falls due. Returns the newest command.
-  const Command& step() {
-    simulator_.set_command(command_.v_mps, command_.w_radps);
-    simulator_.step();
-    if (odometry_.due(now_s())) add_odometry();
-    if (simulator_.next_frame(&request_)) {
-      simulator_.render(request_, &depth_);
-      const auto start = Clock::now();
-      stack_.add_depth(depth_, simulator_.camera(), request_.stamp_s, simulator_.T_base_optical());
-      stack_s_ += seconds_since(start);
-      ++frames_;
-      if (recorder_ != nullptr) {
-        recorder_->frame(request_.stamp_s, simulator_.T_world_base(), simulator_.T_odom_base(), stack_);
-      }
-    }
-    command_.finished = false;
-    if (control_.due(now_s())) {
-      const auto start = Clock::now();
-      command_ = stack_.control(now_s());
-      stack_s_ += seconds_since(start);
-    }
-    if (track_.due(now_s())) {
-      record_->truth.push_back({now_s(), simulator_.T_world_base()});
-      Pose2 T_map_robot;
-      if (stack_.estimate(&T_map_robot)) record_->estimate.push_back({now_s(), T_map_robot});
-    }
-    return command_;
-  }
-
-  /// Sets the robot down and lets it look for a second; beside the waypoint if something stands on it.
-  void place(const Waypoint& waypoint) {
-    Pose2 aside;
-    for (int ring = 0; ring <= 8; ++ring) {
-      for (int k = 0; k < (ring == 0 ? 1 : 12); ++k) {
-        const double angle = k * kPi / 6.0;
-        aside = {0.25 * ring * std::cos(angle), 0.25 * ring * std::sin(angle), 0.0};
-        if (!put(waypoint.T_world_robot * aside)) continue;
-        stack_.place(waypoint.T_map_robot * aside);
-        settle();
-        return;
-      }
-    }
-    throw UserError(fmt::format("no room for the robot within 2 m of waypoint '{}'.", waypoint.name));
-  }
-
-  /// Of the robot's own work (all but the simulation), a frame.
-  double frame_cost_ms() const { return frames_ > 0 ? 1e3 * stack_s_ / static_cast<double>(frames_) : 0.0; }
-
-  void start(const Pose2& T_map_robot) {
-    stack_.place(T_map_robot);
-    settle();
-  }
-
- private:
-  bool put(const Pose2& T_world_base) {
-    try {
-      simulator_.set_pose(T_world_base);
-    } catch (const UserError&) {
-      return false;  // something stands there
-    }
-    return true;
-  }
-
-  void settle() {
-    command_ = {};
-    for (const double until_s = now_s() + 1.0; now_s() < until_s;) step();
-  }
-
-  void add_odometry() {
-    const Pose2 T = simulator_.T_odom_base();
-    const Pose2 moved = last_T_odom_.inverse() * T;
-    const double dt_s = std::max(1e-6, now_s() - last_odometry_s_);
-    stack_.add_odometry(now_s(), T, moved.x_m / dt_s, moved.yaw_rad / dt_s);
-    last_T_odom_ = T;
-    last_odometry_s_ = now_s();
-  }
-
-  Simulator simulator_;
-  NavigationStack stack_;
-  RunRecord* record_;
-  FlightRecorder* recorder_;
-  double stack_s_ = 0.0;
-  std::size_t frames_ = 0;
-  FrameRequest request_;
-  cv::Mat depth_;
-  Command command_;
-  Ticker odometry_{kOdometryPeriod_s}, control_{kControlPeriod_s}, track_{kTrackPeriod_s};
-  Pose2 last_T_odom_;
-  double last_odometry_s_ = 0.0;
-};
 
 /// @param poll  called every simulated second; may throw to stop
 Leg drive_leg(ClosedLoop& loop, const Waypoint& waypoint, const std::function<void()>& poll,
@@ -211,7 +92,7 @@ BuiltMap map_world(const BenchmarkSetup& setup, std::vector<Waypoint>* waypoints
       builder.add_odometry(now_s, simulator.T_odom_base());
       odometry_buffer.add(now_s, simulator.T_odom_base());
       truth.push_back({now_s, simulator.T_world_base()});
-      progress("mapping drive", driver.progress());
+      progress("mapping drive", std::min(0.99, driver.progress()));  // the end comes with the command
     }
     simulator.step();
     if (!simulator.next_frame(&request)) continue;
@@ -255,7 +136,8 @@ RunRecord run_sequence(const BenchmarkSetup& setup, const WorldConfig& changed, 
                        FlightRecorder* recorder) {
   RunRecord record;
   const auto wall_start = Clock::now();
-  ClosedLoop loop(setup, changed, map, &record, recorder);
+  ClosedLoop loop(setup.simulator, setup.stack, changed, map, recorder);
+  loop.record(&record.truth, &record.estimate);
   loop.start(Pose2{});
   RunResult& result = record.result;
   const double start_s = loop.now_s();
@@ -275,7 +157,9 @@ RunRecord run_sequence(const BenchmarkSetup& setup, const WorldConfig& changed, 
     const Pose2& T_world_base = loop.simulator().T_world_base();
     record.failed_at.push_back({T_world_base.x_m, T_world_base.y_m});
     if (recorder != nullptr) recorder->failure(fmt::format("{}_{}", i + 1, leg.waypoint), leg.reason);
-    loop.place(waypoints[i]);
+    if (!loop.place_near(waypoints[i].T_world_robot, waypoints[i].T_map_robot)) {
+      throw UserError(fmt::format("no room for the robot within 2 m of waypoint '{}'.", waypoints[i].name));
+    }
   }
   progress("run", 1.0);
   result.time_s = loop.now_s() - start_s;

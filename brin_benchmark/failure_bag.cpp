@@ -1,6 +1,7 @@
 #include "brin_benchmark/failure_bag.h"
 
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
+#include <nav_msgs/OccupancyGrid.h>
 #include <nav_msgs/Path.h>
 #include <rosbag/bag.h>
 #include <std_msgs/String.h>
@@ -13,6 +14,7 @@ namespace knav {
 namespace {
 
 constexpr double kKept_s = 30.0;
+constexpr double kMapHalf_m = 8.0;
 
 geometry_msgs::TransformStamped transform(const ros::Time& stamp, const char* parent, const char* child,
                                           const Pose2& T) {
@@ -33,6 +35,25 @@ nav_msgs::Odometry odometry(const ros::Time& stamp, const char* frame, const Pos
   return message;
 }
 
+/// The combined map round a place: 100 occupied or keepout, 0 free, -1 unknown.
+nav_msgs::OccupancyGrid map_round(const MapLayer& layer, const Pose2& T_map_base) {
+  const GridGeometry& g = layer.geometry;
+  const int half = static_cast<int>(kMapHalf_m / g.resolution_m), side = 2 * half + 1;
+  const int cx = g.cell_x(T_map_base.x_m), cy = g.cell_y(T_map_base.y_m);
+  nav_msgs::OccupancyGrid grid;
+  grid.header.frame_id = "map";
+  grid.info.resolution = static_cast<float>(g.resolution_m);
+  grid.info.width = grid.info.height = static_cast<unsigned>(side);
+  grid.info.origin = pose_message({g.center_x_m(cx - half) - 0.5 * g.resolution_m, g.center_y_m(cy - half) - 0.5 * g.resolution_m, 0.0});
+  for (int iy = cy - half; iy <= cy + half; ++iy) {
+    for (int ix = cx - half; ix <= cx + half; ++ix) {
+      const CellState state = layer.at(ix, iy);
+      grid.data.push_back(static_cast<signed char>(state == CellState::kFree ? 0 : state == CellState::kUnknown ? -1 : 100));
+    }
+  }
+  return grid;
+}
+
 }  // namespace
 
 void FailureBag::frame(double stamp_s, const Pose2& T_world_base, const Pose2& T_odom_base,
@@ -51,6 +72,7 @@ void FailureBag::frame(double stamp_s, const Pose2& T_world_base, const Pose2& T
   moment.plan = stack.planner().path();
   moment.doing = stack.planner().explanation();
   moments_.push_back(std::move(moment));
+  stack_ = &stack;
 }
 
 void FailureBag::failure(const std::string& leg, const std::string& reason) {
@@ -95,7 +117,15 @@ void FailureBag::failure(const std::string& leg, const std::string& reason) {
     }
     std_msgs::String why;
     why.data = reason;
-    if (!moments_.empty()) bag.write("failure", ros::Time(moments_.back().stamp_s), why);
+    if (!moments_.empty()) {
+      const Moment& last = moments_.back();
+      bag.write("failure", ros::Time(last.stamp_s), why);
+      if (last.located && !stack_->planner().map().empty()) {
+        nav_msgs::OccupancyGrid map = map_round(stack_->planner().map().combined(), last.T_map_base);
+        map.header.stamp = ros::Time(last.stamp_s);
+        bag.write("combined_map", map.header.stamp, map);
+      }
+    }
     bag.close();
   });
   moments_.clear();

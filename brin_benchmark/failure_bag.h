@@ -12,7 +12,7 @@
 namespace knav {
 
 /// Writes the 30 s before a failure as a bag: ground_truth, odom, depth_profile, scan_360, amcl_pose, plan,
-/// TF.
+/// TF; and combined_map, what the planner took for free and occupied round the robot in the end.
 class FailureBag : public FlightRecorder {
  public:
   /// @param path_stem  bags are path_stem_LEG.bag
@@ -35,6 +35,7 @@ class FailureBag : public FlightRecorder {
 
   std::string path_stem_;
   std::deque<Moment> moments_;
+  const NavigationStack* stack_ = nullptr;  ///< of the last frame
 };
 
 }  // namespace knav

@@ -123,9 +123,9 @@ bool FloorPlan::connected(const std::vector<Point2>& points, const std::vector<S
   });
 }
 
-std::vector<Point2> FloorPlan::reachable(double clearance_m) const {
+std::vector<Point2> FloorPlan::reachable(double clearance_m, const std::vector<Solid>& added) const {
   const GridGeometry& g = map_.global().geometry;
-  const std::vector<char> seen = flood({}, robot_radius_m_ + kSpare_m);
+  const std::vector<char> seen = flood(added, robot_radius_m_ + kSpare_m);
   std::vector<Point2> points;
   for (int iy = 0; iy < g.height_cells; iy += kCoarse) {
     for (int ix = 0; ix < g.width_cells; ix += kCoarse) {

@@ -25,8 +25,8 @@ class FloorPlan {
   /// True if all points are connected, for a robot with 7 cm to spare on each side, once these stand there
   /// too.
   bool connected(const std::vector<Point2>& points, const std::vector<Solid>& added) const;
-  /// Points that can be reached from the start with this clearance, 0.2 m apart.
-  std::vector<Point2> reachable(double clearance_m) const;
+  /// Points that can be reached from the start with this clearance, 0.2 m apart, once these stand there too.
+  std::vector<Point2> reachable(double clearance_m, const std::vector<Solid>& added = {}) const;
 
  private:
   std::vector<char> flood(const std::vector<Solid>& added, double clearance_m) const;

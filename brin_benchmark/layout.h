@@ -17,6 +17,8 @@ struct LayoutConfig {
   double robot_radius_m = 0.20;
   double tour_spacing_m = 4.0;  ///< the tour comes this near to every place that can be reached
   double moved_share = 0.3;     ///< of the movable furniture
+  int people = 0;               ///< in every run; 0 = 3 to 6, and 10 in a crowd
+  std::string closed_door;      ///< closed in every run, whatever it cuts off
 };
 
 /// A benchmark laid out in a building: where the robot is sent, how it is mapped, and what changes from run

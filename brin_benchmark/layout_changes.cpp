@@ -10,6 +10,8 @@ namespace knav {
 namespace {
 
 constexpr double kFreePlace_m = 0.7;  ///< nothing is put nearer to a place than this
+/// Nobody stands nearer to where the robot is switched on: whoever is against it before the first leg says nothing about it.
+constexpr double kFreeStart_m = 1.5;
 
 double distance_m(const Point2& a, const Point2& b) { return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m); }
 
@@ -40,7 +42,7 @@ class RunMaker {
     text += doors();
     text += moved();
     text += boxes();
-    text += people(crowd ? 10 : 3 + run_ % 4, crowd);
+    text += people(config_.people > 0 ? config_.people : crowd ? 10 : 3 + run_ % 4, crowd);
     if (run_ % 3 == 2) text += sun();
     return text;
   }
@@ -68,6 +70,11 @@ class RunMaker {
   std::string doors() {
     std::string text;
     for (const DoorConfig& door : world_.doors) {
+      if (!door.name.empty() && door.name == config_.closed_door) {
+        added_.push_back(door_leaf(door, 0.0));
+        text += fmt::format("      - {{name: '{}', open_deg: 0}}\n", door.name);
+        continue;
+      }
       if (door.name.empty() || random_.uniform() > 0.35) continue;
       const double open_deg = door.open_rad * 180.0 / kPi;
       std::string entry;
@@ -193,9 +200,11 @@ class RunMaker {
     std::string text;
     for (int i = 0, attempt = 0; i < count && attempt < 50 * count; ++attempt) {
       Point2 from = open_[pick(open_.size())], to = open_[pick(open_.size())];
-      // Half of them have business on the robot's way.
-      if (!crowd && i % 2 == 0 && !on_the_way(&from)) continue;
+      // Half of them have business on the robot's way, if there is a place for it.
+      if (!crowd && i % 2 == 0 && attempt < 25 * count && !on_the_way(&from)) continue;
       const double distance = distance_m(from, to);
+      const Point2 start{world_.spawn.x_m, world_.spawn.y_m};
+      if (std::min(distance_m(from, start), distance_m(to, start)) < kFreeStart_m) continue;
       if (crowd ? distance_m(from, center) > 6.0 || distance_m(to, center) > 6.0 || distance < 1.5
                 : distance < 3.0 || distance > 15.0) {
         continue;

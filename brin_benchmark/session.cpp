@@ -3,14 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <exception>
 #include <filesystem>
-#include <mutex>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "brin_benchmark/benchmark_report.h"
+#include "brin_benchmark/run_jobs.h"
 #include "core/config.h"
 #include "core/error.h"
 #include "core/file_io.h"
@@ -165,34 +162,10 @@ void BenchmarkSession::drive(std::size_t run, const RecorderFactory& recorder,
 
 void BenchmarkSession::run(const RecorderFactory& recorder, const SessionProgress& progress) {
   const std::vector<std::size_t> runs = missing_runs();
-  std::vector<double> done(runs.size(), 0.0);
-  std::mutex mutex;
-  std::exception_ptr fault;
-  std::atomic<std::size_t> next{0};
-  const auto report = [&](std::size_t k, double fraction) {
-    const std::lock_guard<std::mutex> lock(mutex);
-    if (fault) std::rethrow_exception(fault);
-    done[k] = fraction;
-    double sum = 0.0;
-    for (const double d : done) sum += d;
-    progress("runs", sum / static_cast<double>(runs.size()), fmt::format("{} to drive", runs.size()));
-  };
-  const auto work = [&] {
-    try {
-      for (std::size_t k = next++; k < runs.size(); k = next++) {
-        drive(runs[k], recorder, [&](double fraction) { report(k, fraction); });
-      }
-    } catch (...) {
-      const std::lock_guard<std::mutex> lock(mutex);
-      if (!fault) fault = std::current_exception();
-    }
-  };
-  std::vector<std::thread> others;
-  const int jobs = std::clamp(options_.jobs, 1, std::max(1, static_cast<int>(runs.size())));
-  for (int i = 1; i < jobs; ++i) others.emplace_back(work);
-  work();
-  for (std::thread& thread : others) thread.join();
-  if (fault) std::rethrow_exception(fault);
+  run_jobs(
+      runs.size(), options_.jobs,
+      [&](std::size_t k, const std::function<void(double)>& report) { drive(runs[k], recorder, report); },
+      [&](double fraction) { progress("runs", fraction, fmt::format("{} to drive", runs.size())); });
 }
 
 std::vector<RunResult> BenchmarkSession::results() const { return read_results(options_.out); }

@@ -166,7 +166,7 @@ void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_lo
   }
 }
 
-const MapLayer& CombinedMap::permissive() {
+const MapLayer& CombinedMap::permissive(const std::vector<Point2>& closed, double round_m) {
   permissive_.geometry = global_.geometry;
   permissive_.reach_cells = global_.reach_cells;
   permissive_.state.resize(global_.state.size());
@@ -176,6 +176,17 @@ const MapLayer& CombinedMap::permissive() {
     permissive_.state[i] = newly_free ? CellState::kFree : global_.state[i];
   }
   const GridGeometry& g = global_.geometry;
+  const int r = static_cast<int>(round_m / g.resolution_m);
+  for (const Point2& p : closed) {
+    const int cx = g.cell_x(p.x_m), cy = g.cell_y(p.y_m);
+    for (int dy = -r; dy <= r; ++dy) {
+      for (int dx = -r; dx <= r; ++dx) {
+        if (dx * dx + dy * dy > r * r || combined_.at(cx + dx, cy + dy) == CellState::kFree || !g.contains(cx + dx, cy + dy)) continue;
+        const std::size_t i = g.index(cx + dx, cy + dy);
+        permissive_.state[i] = combined_.state[i];
+      }
+    }
+  }
   distance_.update(g.width_cells, g.height_cells, bytes(permissive_.state), kOpen, {0, 0, g.width_cells, g.height_cells},
                    permissive_.squared_cells.data());
   return permissive_;

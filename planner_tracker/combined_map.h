@@ -66,7 +66,10 @@ class CombinedMap {
   const MapLayer& combined() const { return combined_; }
   /// What would be open if all that the local map closes went away: the global map, and where that knows nothing, what the
   /// local map saw free. Made anew by each call, over the whole map: for when there is no way.
-  const MapLayer& permissive();
+  /// @param closed  what closes the map within `round_m` of these points stays
+  const MapLayer& permissive(const std::vector<Point2>& closed = {}, double round_m = 0.0);
+  /// The cells that the newest local map covers, as far as it knows anything.
+  const CellWindow& local_window() const { return local_window_; }
   /// Cells whose state changed in the last call.
   std::size_t changed_cells() const { return changed_cells_; }
 

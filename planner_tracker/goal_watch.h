@@ -12,9 +12,10 @@ class GoalWatch {
     best_m_ = 1e9;
     anchor_s_ = now_s;
   }
-  /// @param remaining_m of the path; a new path only counts once it was followed a bit
+  /// @param remaining_m of the path; a new path only counts once it was followed a bit, and one as long as the old is the old:
+  /// a robot that steps aside and comes back gets no nearer
   void progress(double now_s, double remaining_m, bool new_path) {
-    if (new_path) best_m_ = remaining_m;
+    if (new_path && (remaining_m < best_m_ || remaining_m > best_m_ + kOtherWay_m)) best_m_ = remaining_m;
     if (remaining_m > best_m_ - kStep_m) return;
     if (best_m_ < 1e8) progress_s_ = now_s;
     best_m_ = remaining_m;
@@ -32,6 +33,7 @@ class GoalWatch {
 
  private:
   static constexpr double kStep_m = 0.3;
+  static constexpr double kOtherWay_m = 1.0;
 
   double progress_s_ = 0.0, best_m_ = 1e9, anchor_s_ = 0.0;
   Pose2 anchor_;

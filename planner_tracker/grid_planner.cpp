@@ -81,7 +81,7 @@ bool GridPlanner::Search::find_escape(const MapLayer& layer, const Cell& start, 
   escape.clear();
   const double resolution = layer.geometry.resolution_m;
   const int r = std::max(1, static_cast<int>(config.clearance.escape_m / resolution));
-  const int under = static_cast<int>(0.5 * config.robot_radius / resolution);
+  const int under = static_cast<int>(0.5 * config.outline().inscribed_m() / resolution);
   const int side = 2 * r + 1;
   std::vector<float> cost(static_cast<std::size_t>(side * side), std::numeric_limits<float>::infinity());
   std::vector<int> parent(cost.size(), -1);

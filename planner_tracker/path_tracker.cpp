@@ -14,59 +14,17 @@ constexpr double kNearEnd_m = 0.4;
 }  // namespace
 
 PathTracker::PathTracker(const PlannerTrackerConfig& config)
-    : config_(config), stop_radius_m_(config.robot_radius + kInsist * config.clearance.hard_m) {}
+    : config_(config),
+      outline_(config.outline()),
+      margin_m_(kInsist * config.clearance.hard_m),
+      stop_radius_m_(outline_.inscribed_m() + margin_m_),
+      hard_radius_m_(outline_.inscribed_m() + config.clearance.hard_m),
+      preferred_radius_m_(outline_.inscribed_m() + config.clearance.preferred_m) {}
 
 void PathTracker::reset() { turning_ = false; }
 
 double PathTracker::approach(double from, double to, double step) const {
   return to > from ? std::min(to, from + step) : std::max(to, from - step);
-}
-
-double PathTracker::clearance_m(const TrackInput& input, double x_m, double y_m) const {
-  const Point2 p = input.T_map_base * Point2{x_m, y_m};
-  return std::min(input.scan->clearance_m(x_m, y_m), input.layer->clearance_m(p.x_m, p.y_m));
-}
-
-bool PathTracker::unknown_ground(const TrackInput& input, double x_m, double y_m) const {
-  if (std::hypot(x_m, y_m) <= 0.5 * config_.robot_radius) return false;
-  const Point2 p = input.T_map_base * Point2{x_m, y_m};
-  return input.layer->clearance_m(p.x_m, p.y_m) <= 0.0;
-}
-
-PathTracker::Rollout PathTracker::roll_out(const TrackInput& input, double curvature, double length_m,
-                                           double near_m, bool backwards) const {
-  Rollout out;
-  const double here = clearance_m(input, 0.0, 0.0);
-  out.least_clearance_m = here;
-  // Standing too near to something already, it may move, but not come nearer.
-  double demanded = std::min(stop_radius_m_, here - 0.005);
-  double yaw = 0.0;
-  const double step = backwards ? -kStep_m : kStep_m;
-  for (double s = 0.0; s < length_m; s += kStep_m) {
-    const double middle = yaw + 0.5 * curvature * step;
-    const double x = out.end_x_m + step * std::cos(middle), y = out.end_y_m + step * std::sin(middle);
-    const double c = clearance_m(input, x, y);
-    if (c < demanded || unknown_ground(input, x, y)) break;
-    demanded = std::min(stop_radius_m_, std::max(demanded, c - 0.03));
-    yaw += curvature * step;
-    out.end_x_m = x;
-    out.end_y_m = y;
-    out.free_m = s + kStep_m;
-    if (out.free_m <= near_m) out.least_clearance_m = std::min(out.least_clearance_m, c);
-  }
-  return out;
-}
-
-double PathTracker::straight_free_m(const TrackInput& input, double bearing_rad, double length_m) const {
-  double demanded = std::min(stop_radius_m_, clearance_m(input, 0.0, 0.0) - 0.005);
-  double s = 0.0;
-  for (; s < length_m; s += kStep_m) {
-    const double x = (s + kStep_m) * std::cos(bearing_rad), y = (s + kStep_m) * std::sin(bearing_rad);
-    const double c = clearance_m(input, x, y);
-    if (c < demanded || unknown_ground(input, x, y)) break;
-    demanded = std::min(stop_radius_m_, std::max(demanded, c - 0.03));
-  }
-  return std::min(s, length_m);
 }
 
 TrackOutput PathTracker::stop(const TrackInput& input) const {
@@ -85,6 +43,19 @@ TrackOutput PathTracker::turn(const TrackInput& input, double error_rad) const {
       std::min(config_.max_vel_theta, std::sqrt(2.0 * 0.6 * config_.acc_lim_theta * std::abs(error_rad)));
   w = std::max(w * std::min(1.0, std::abs(error_rad) / 0.1), config_.tracking.min_in_place_vel_theta);
   if (std::abs(error_rad) < 0.01) w = 0.0;
+  if (w > 0.0 && !outline_.is_disc()) {
+    // A corner may be in the way; then the other way round.
+    const double side = std::copysign(1.0, error_rad), most = std::abs(error_rad);
+    if (turn_free_rad(input, side, most) < most - 1e-6) {
+      if (turn_free_rad(input, -side, 2.0 * kPi - most) > 2.0 * kPi - most - 1e-6) {
+        error_rad = -error_rad;
+      } else {
+        w = 0.0;
+        out.kind = TrackOutput::Kind::kBlocked;
+        out.obstacle = {input.T_map_base.x_m, input.T_map_base.y_m};
+      }
+    }
+  }
   out.w_radps = approach(input.w_radps, std::copysign(w, error_rad), config_.acc_lim_theta * input.dt_s);
   return out;
 }
@@ -105,21 +76,39 @@ TrackOutput PathTracker::creep(const TrackInput& input, double distance_m) const
   return out;
 }
 
+double PathTracker::speed_near_moving_mps(const TrackInput& input, const Rollout& ahead) const {
+  const TrackingConfig& t = config_.tracking;
+  if (input.moving == nullptr || input.moving->empty()) return config_.max_vel_x;
+  const Pose2 T_base_map = input.T_map_base.inverse();
+  const double length2 = ahead.end_x_m * ahead.end_x_m + ahead.end_y_m * ahead.end_y_m;
+  double nearest = t.moving_distance_m;
+  for (const Point2& at : *input.moving) {
+    const Point2 p = T_base_map * at;
+    // Whoever is behind is left behind.
+    if (p.x_m < 0.0) continue;
+    const double along = length2 > 0.0 ? std::clamp((p.x_m * ahead.end_x_m + p.y_m * ahead.end_y_m) / length2, 0.0, 1.0) : 0.0;
+    nearest = std::min(nearest, std::hypot(p.x_m - along * ahead.end_x_m, p.y_m - along * ahead.end_y_m) - hard_radius_m_);
+  }
+  const double share = std::clamp(nearest / t.moving_distance_m, 0.0, 1.0);
+  const double slow = std::min(t.moving_mps, config_.max_vel_x);
+  return slow + (config_.max_vel_x - slow) * share;
+}
+
 TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
   const TrackingConfig& t = config_.tracking;
   const double share = std::clamp(input.v_mps / config_.max_vel_x, 0.0, 1.0);
   double lookahead = t.lookahead_m * (0.6 + 0.4 * share) + path.offset_m();
   // Not across a corner: the straight line to the point must be as open as the robot's own place allows.
   const Pose2 T_base_map = input.T_map_base.inverse();
-  const double here = clearance_m(input, 0.0, 0.0);
-  const double wanted = std::min({config_.hard_radius_m() - 0.02, here - 0.005});
+  const double here = point_clearance_m(input, 0.0, 0.0);
+  const double wanted = std::min({hard_radius_m_ - 0.02, here - 0.005});
   Point2 target;
   for (;; lookahead *= 0.75) {
     target = T_base_map * path.point_at(path.at_m() + lookahead);
     const double length = std::hypot(target.x_m, target.y_m);
     bool open = true;
     for (double s = kStep_m; s < length && open; s += kStep_m) {
-      open = clearance_m(input, target.x_m * s / length, target.y_m * s / length) >= wanted;
+      open = point_clearance_m(input, target.x_m * s / length, target.y_m * s / length) >= wanted;
     }
     if (open || lookahead < 0.2) break;
   }
@@ -152,7 +141,7 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
       if (r.free_m < enough) continue;
       const double off = std::hypot(r.end_x_m - target.x_m, r.end_y_m - target.y_m);
       const double cost =
-          off + 0.05 * std::abs(i) + 0.5 * std::max(0.0, config_.preferred_radius_m() - r.least_clearance_m);
+          off + 0.05 * std::abs(i) + 0.5 * std::max(0.0, preferred_radius_m_ - r.least_clearance_m);
       if (cost < best && r.end_x_m > 0.1) {
         best = cost;
         best_curvature = k;
@@ -174,11 +163,10 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
 
   // Every limit has its own reason; the lowest holds.
   const double near_share =
-      std::clamp((ahead.least_clearance_m - config_.hard_radius_m()) /
-                     std::max(0.01, config_.preferred_radius_m() - config_.hard_radius_m()),
+      std::clamp((ahead.least_clearance_m - hard_radius_m_) / std::max(0.01, preferred_radius_m_ - hard_radius_m_),
                  0.0, 1.0);
   double v = t.slow_mps + (config_.max_vel_x - t.slow_mps) * near_share;
-  v = std::min(v, config_.max_vel_x);
+  v = std::min({v, config_.max_vel_x, speed_near_moving_mps(input, ahead)});
   v *= std::clamp(1.0 - 0.8 * (std::abs(bearing) - 0.2) / t.turn_first_rad, 0.15, 1.0);
   if (std::abs(curvature) > 1e-6) v = std::min(v, config_.max_vel_theta / std::abs(curvature));
   v = std::min(v, std::sqrt(2.0 * 0.7 * config_.acc_lim_x * std::max(0.0, path.remaining_m())) + 0.01);

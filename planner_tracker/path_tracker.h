@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "core/pose2.h"
 #include "planner_tracker/combined_map.h"
 #include "planner_tracker/path.h"
@@ -13,8 +15,9 @@ struct TrackInput {
   Pose2 T_map_base;
   double v_mps = 0.0, w_radps = 0.0;  ///< commanded last
   double dt_s = 0.05;
-  const MapLayer* layer = nullptr;  ///< the combined map
+  const MapLayer* layer = nullptr;  ///< the combined map; null where only the scan is to be believed
   const ScanView* scan = nullptr;
+  const std::vector<Point2>* moving = nullptr;  ///< in the map: what moves or has just appeared; may be null
 };
 
 struct TrackOutput {
@@ -40,12 +43,12 @@ class PathTracker {
   /// Brakes within the limits.
   TrackOutput stop(const TrackInput& input) const;
 
-  /// The distance to anything, seen or known, under which the footprint must not come.
-  double stop_radius_m() const { return stop_radius_m_; }
-  /// Of a point in the robot's frame, to what scan or map has there.
-  double clearance_m(const TrackInput& input, double x_m, double y_m) const;
+  /// A disc that holds the footprint whichever way it faces, and the margin under which nothing must come.
+  double safe_radius_m() const { return outline_.circumscribed_m() + margin_m_; }
   /// How far the robot may go straight in a direction of its frame [m], at most `length_m`.
   double straight_free_m(const TrackInput& input, double bearing_rad, double length_m) const;
+  /// How far the robot may turn on the spot [rad], to the left (+1) or right (-1), at most `most_rad`.
+  double turn_free_rad(const TrackInput& input, double side, double most_rad) const;
   /// How far an arc may be driven [m], at most up to `length_m`; and its least clearance within `near_m`.
   struct Rollout {
     double free_m = 0.0, least_clearance_m = 0.0;
@@ -55,6 +58,13 @@ class PathTracker {
                    bool backwards) const;
 
  private:
+  /// Of a point in the robot's frame, to what scan or map has there.
+  double point_clearance_m(const TrackInput& input, double x_m, double y_m) const;
+  /// The same for a robot in this pose of its present frame: what a disc of the inscribed radius would need to have just
+  /// as much room as the footprint has.
+  double clearance_m(const TrackInput& input, double x_m, double y_m, double yaw_rad) const;
+  /// What moves nearby allows.
+  double speed_near_moving_mps(const TrackInput& input, const Rollout& ahead) const;
   /// True off the cells the map calls free. A robot that stands in the midst of unknown keeps clearance 0
   /// wherever it goes, so that a rule of not coming nearer would not hold it. Half its radius is let pass (it
   /// stands there), too little to creep on by.
@@ -62,7 +72,10 @@ class PathTracker {
   double approach(double from, double to, double step) const;
 
   PlannerTrackerConfig config_;
-  double stop_radius_m_;
+  Footprint outline_;
+  double margin_m_;       ///< nothing may come nearer to the footprint
+  double stop_radius_m_;  ///< the same as a clearance_m()
+  double hard_radius_m_, preferred_radius_m_;
   bool turning_ = false;
 };
 

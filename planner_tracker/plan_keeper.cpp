@@ -11,6 +11,12 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// Farther from the old path than this, the robot is on another.
 constexpr double kOffPath_m = 0.5;
 constexpr double kNearestLook_m = 0.25;
+constexpr double kClosedRound_m = 0.6;   ///< what closes a way there belongs together
+constexpr double kSamePlace_m = 1.0;
+constexpr int kEnoughLooks = 2;
+constexpr double kAsGood_m = 0.15;       ///< so much farther off is as good a place to look from
+constexpr double kElsewhere_m = 0.6;     ///< another place to look from is this far from the last at least
+constexpr double kBeginning_m = 0.5;  ///< of a path, for its direction
 constexpr double kStandsBefore_m = 0.6;  ///< what closes a way may reach this far before the point where it does
 constexpr int kDirections = 24;
 constexpr int kMostTried = 4;
@@ -21,7 +27,7 @@ PlanKeeper::PlanKeeper(const PlannerTrackerConfig& config) : config_(config), pl
 
 void PlanKeeper::set_map(const CombinedMap& map) {
   planner_.set_map(map.global());
-  path_.clear();
+  start_goal();
 }
 
 void PlanKeeper::take(const std::vector<Point2>& path) {
@@ -30,18 +36,40 @@ void PlanKeeper::take(const std::vector<Point2>& path) {
   ++switches_;
 }
 
-double PlanKeeper::old_cost_m(const MapLayer& layer, const Point2& robot) {
-  if (path_.empty()) return kInfinite;
-  path_.advance(robot);
-  if (path_.offset_m() > kOffPath_m) return kInfinite;
-  path_.rest(&rest_);
-  double cost = path_.offset_m();
+double PlanKeeper::old_cost_m(const MapLayer& layer, Path* path, const Point2& robot) {
+  if (path->empty()) return kInfinite;
+  path->advance(robot);
+  if (path->offset_m() > kOffPath_m) return kInfinite;
+  path->rest(&rest_);
+  double cost = path->offset_m();
   for (std::size_t i = 1; i < rest_.size(); ++i) {
     cost += planner_.segment_cost_m(layer, rest_[i - 1], rest_[i]);
     // The cells the robot stands in may be closed: it is on its way out of them.
-    if (!std::isfinite(cost) && i == 1 && !planner_.open(layer, rest_[0])) cost = path_.remaining_m();
+    if (!std::isfinite(cost) && i == 1 && !planner_.open(layer, rest_[0])) cost = path->remaining_m();
   }
   return cost;
+}
+
+double PlanKeeper::turning_cost_m(const Path& path, const Pose2& robot) const {
+  if (path.remaining_m() < kBeginning_m) return 0.0;
+  const Point2 p = robot.inverse() * path.point_at(path.at_m() + kBeginning_m);
+  return std::abs(std::atan2(p.y_m, p.x_m)) / config_.max_vel_theta * config_.max_vel_x;
+}
+
+bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s) {
+  const bool first = held_since_s_ < 0.0;
+  if (first) held_ = path_;
+  held_.advance(robot);
+  const bool detour = result_.cost_m > held_.remaining_m() + config_.planning.hold_detour_m;
+  if (held_.empty() || held_.offset_m() > kOffPath_m || !detour) return false;
+  if (first) held_since_s_ = now_s;
+  if (now_s - held_since_s_ > config_.planning.hold_s) return false;
+  std::vector<Point2> way;
+  held_.rest(&way);
+  if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), &way)) return false;
+  path_.set(way);
+  path_kind_ = Outcome::kToBlockage;
+  return true;
 }
 
 bool PlanKeeper::cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, std::vector<Point2>* way) {
@@ -74,7 +102,12 @@ bool PlanKeeper::cut_at_blockage(const MapLayer& layer, const MapLayer& unchange
   return false;
 }
 
-bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot,
+bool PlanKeeper::looks_at_it(const MapLayer& unchanged, const Point2& from) const {
+  const double away_m = std::hypot(from.x_m - at_.x_m, from.y_m - at_.y_m);
+  return away_m < config_.planning.look_distance_m + kAsGood_m && std::isfinite(planner_.segment_cost_m(unchanged, from, at_));
+}
+
+bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, double beyond_m,
                              std::vector<Point2>* way) {
   std::vector<Point2> places;
   for (const double share : {1.0, 1.25}) {
@@ -89,6 +122,7 @@ bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, c
     }
   }
   const auto away_m = [&](const Point2& p) { return std::hypot(p.x_m - robot.x_m, p.y_m - robot.y_m); };
+  places.erase(std::remove_if(places.begin(), places.end(), [&](const Point2& p) { return away_m(p) < beyond_m; }), places.end());
   std::sort(places.begin(), places.end(), [&](const Point2& a, const Point2& b) { return away_m(a) < away_m(b); });
   for (std::size_t i = 0; i < std::min<std::size_t>(kMostTried, places.size()); ++i) {
     planner_.plan(layer, robot, places[i], &result_);
@@ -99,10 +133,22 @@ bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, c
   return false;
 }
 
-PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Point2& robot, const Point2& goal) {
+const MapLayer& PlanKeeper::plan_unchanged(CombinedMap& map, const Point2& robot, const Point2& goal) {
+  const MapLayer* unchanged = &map.permissive(closed_, kClosedRound_m);
+  planner_.plan(*unchanged, robot, goal, &result_);
+  if (result_.code != PlanCode::kOk && !closed_.empty()) {
+    unchanged = &map.permissive();
+    planner_.plan(*unchanged, robot, goal, &result_);
+  }
+  return *unchanged;
+}
+
+PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robot, const Point2& goal, double now_s) {
   switched_ = false;
+  const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
   const MapLayer& layer = map.combined();
   Outcome kind = Outcome::kToGoal;
+  Point2 nearby;
   planner_.plan(layer, robot, goal, &result_);
   if (result_.code == PlanCode::kGoalOccupied || result_.code == PlanCode::kGoalUnknown) {
     at_ = result_.at;
@@ -110,32 +156,63 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Point2& robot, co
       path_.clear();
       return result_.code == PlanCode::kGoalOccupied ? Outcome::kGoalOccupied : Outcome::kGoalUnknown;
     }
-    Point2 nearby;
     if (planner_.nearest_open(layer, goal, config_.planning.goal_snap_m, &nearby)) {
       kind = Outcome::kToNearby;
       planner_.plan(layer, robot, nearby, &result_);
     }
   }
+  if (result_.code == PlanCode::kOk && kind == Outcome::kToNearby) {
+    // Right beside it the floor under it is out of sight: whether it has gone is seen from farther off.
+    std::vector<Point2> way;
+    if (look_elsewhere_ && way_to_look(layer, map.global(), robot, kElsewhere_m, &way)) {
+      elsewhere_ = true;
+      take(way);
+    }
+    look_elsewhere_ = false;
+    if (elsewhere_ && std::isfinite(old_cost_m(layer, &path_, robot))) {
+      path_kind_ = kind;
+      return kind;
+    }
+    planner_.plan(layer, robot, nearby, &result_);
+  }
   if (result_.code == PlanCode::kOk) {
-    const double old = path_kind_ == kind ? old_cost_m(layer, robot) : kInfinite;
+    if (holding() && kind == Outcome::kToGoal && std::isfinite(old_cost_m(layer, &held_, robot))) {
+      // Open again: on as before.
+      path_ = held_;
+      path_kind_ = kind;
+    }
+    const double old = path_kind_ == kind ? old_cost_m(layer, &path_, robot) : kInfinite;
+    const bool was_to_goal = kind == Outcome::kToGoal && (holding() || (path_kind_ == kind && !path_.empty()));
+    if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s)) return Outcome::kToBlockage;
+    held_since_s_ = -1.0;
+    elsewhere_ = look_elsewhere_ = false;
     const bool same_end =
         !path_.empty() && !result_.path.empty() &&
         std::hypot(path_.end().x_m - result_.path.back().x_m, path_.end().y_m - result_.path.back().y_m) <
             (kind == Outcome::kToGoal ? 0.01 : 0.3);
-    const bool clearly_better = result_.cost_m < old * (1.0 - config_.planning.switch_gain) &&
-                                result_.cost_m < old - config_.planning.switch_gain_m;
+    tried_.set(result_.path);
+    const double now_cost = old + turning_cost_m(path_, T_map_robot), new_cost = result_.cost_m + turning_cost_m(tried_, T_map_robot);
+    const bool clearly_better = new_cost < now_cost * (1.0 - config_.planning.switch_gain) &&
+                                new_cost < now_cost - config_.planning.switch_gain_m;
     if (!same_end || !std::isfinite(old) || clearly_better) take(result_.path);
     path_kind_ = kind;
     return kind;
   }
+  held_since_s_ = -1.0;
   if (result_.code == PlanCode::kStartBlocked) {
     at_ = result_.at;
     path_.clear();
     return Outcome::kStartBlocked;
   }
   // No way now. Would there be one, and where is it closed?
-  const MapLayer& unchanged = map.permissive();
-  planner_.plan(unchanged, robot, goal, &result_);
+  if (look_elsewhere_ && ++looks_ >= kEnoughLooks) {
+    looks_ = 0;
+    closed_.push_back(at_);
+    // Another way to be looked at? If not, back to this one, from where it was not looked at last.
+    look_elsewhere_ = false;
+    path_.clear();
+  }
+  const MapLayer& unchanged = plan_unchanged(map, robot, goal);
   if (result_.code != PlanCode::kOk) {
     at_ = result_.at;
     path_.clear();
@@ -143,14 +220,25 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Point2& robot, co
   }
   std::vector<Point2> way = result_.path;
   if (!cut_at_blockage(layer, unchanged, &way)) at_ = goal;
+  const auto same_place = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kSamePlace_m; };
+  if (!same_place(last_at_)) looks_ = 0;
+  last_at_ = at_;
   const auto too_near = [&](const Point2& p) {
     return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < config_.planning.too_near_m();
   };
   const bool robot_too_near = too_near(robot);
-  const bool keep = path_kind_ == Outcome::kToBlockage && std::isfinite(old_cost_m(layer, robot)) &&
-                    !(robot_too_near && too_near(path_.end()));
+  // What closes the way may be elsewhere than it seemed from afar: then it is looked at from elsewhere, too.
+  const bool keep = path_kind_ == Outcome::kToBlockage && !look_elsewhere_ && std::isfinite(old_cost_m(layer, &path_, robot)) &&
+                    (elsewhere_ || looks_at_it(unchanged, path_.end())) && !(robot_too_near && too_near(path_.end()));
   if (!keep) {
-    if (robot_too_near) way_to_look(layer, unchanged, robot, &way);
+    elsewhere_ = false;
+    if (look_elsewhere_) {
+      elsewhere_ = way_to_look(layer, unchanged, robot, kElsewhere_m, &way);
+    } else if (robot_too_near) {
+      way_to_look(layer, unchanged, robot, 0.0, &way);
+    }
+    look_elsewhere_ = false;
+    elsewhere_ = elsewhere_ || std::any_of(closed_.begin(), closed_.end(), same_place);
     take(way);
   }
   path_kind_ = Outcome::kToBlockage;

@@ -29,8 +29,23 @@ class PlanKeeper {
   explicit PlanKeeper(const PlannerTrackerConfig& config);
 
   void set_map(const CombinedMap& map);
-  void start_goal() { path_.clear(); }
-  Outcome replan(CombinedMap& map, const Point2& robot, const Point2& goal);
+  void start_goal() {
+    path_.clear();
+    held_.clear();
+    held_since_s_ = -1.0;
+    elsewhere_ = look_elsewhere_ = false;
+    looks_ = 0;
+    closed_.clear();
+  }
+  Outcome replan(CombinedMap& map, const Pose2& robot, const Point2& goal, double now_s);
+  /// True if the way that is closed was open a moment ago and is expected to be again: the outcome is kToBlockage, though there
+  /// is a way round.
+  bool holding() const { return held_since_s_ >= 0.0; }
+  /// Where the robot looks at a closed way from has shown it nothing new: the next replan() leads it to another place, and after
+  /// that to another way, if there is one: what closes that one may be gone when it is looked at.
+  void look_elsewhere() { look_elsewhere_ = true; }
+  /// True while path() leads from one place to look at a closed way from to another, or back to one already looked at.
+  bool elsewhere() const { return elsewhere_; }
   /// True if the last replan() replaced the path by another.
   bool switched() const { return switched_; }
   int switches() const { return switches_; }
@@ -41,13 +56,22 @@ class PlanKeeper {
   GridPlanner& planner() { return planner_; }
 
  private:
-  double old_cost_m(const MapLayer& layer, const Point2& robot);
+  double old_cost_m(const MapLayer& layer, Path* path, const Point2& robot);
+  /// What it costs to turn towards a path's beginning: the metres the robot could have driven meanwhile.
+  double turning_cost_m(const Path& path, const Pose2& robot) const;
+  /// True if the way round is to be left alone for now.
+  bool hold(CombinedMap& map, const Point2& robot, double now_s);
   void take(const std::vector<Point2>& path);
   /// Finds where the layer closes a way of the unchanged map (at_), and keeps the way's beginning up to where the robot
   /// can look at that from look_distance_m, or nearer where corners hide it. False if the layer does not close it.
   bool cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, std::vector<Point2>* way);
-  /// A way to the nearest place from which the blockage can be looked at, for a robot that stands too near to it.
-  bool way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, std::vector<Point2>* way);
+  /// A way to the nearest place from which the blockage can be looked at and that is farther than `beyond_m`, for a robot that
+  /// stands too near to it or has seen nothing from where it stands.
+  bool way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, double beyond_m, std::vector<Point2>* way);
+  /// The unchanged map's best way that avoids what was looked at; the best of all if there is none.
+  const MapLayer& plan_unchanged(CombinedMap& map, const Point2& robot, const Point2& goal);
+  /// True if the blockage can be looked at from there.
+  bool looks_at_it(const MapLayer& unchanged, const Point2& from) const;
 
   PlannerTrackerConfig config_;
   GridPlanner planner_;
@@ -55,6 +79,12 @@ class PlanKeeper {
   Outcome path_kind_ = Outcome::kToGoal;
   PlanResult result_;
   std::vector<Point2> rest_;
+  Path held_, tried_;
+  double held_since_s_ = -1.0;
+  bool look_elsewhere_ = false, elsewhere_ = false;
+  int looks_ = 0;                ///< at the present blockage, in vain
+  Point2 last_at_;
+  std::vector<Point2> closed_;   ///< looked at on the way to this goal, and closed
   Point2 at_;
   bool switched_ = false;
   int switches_ = 0;

@@ -20,7 +20,8 @@ namespace knav {
 namespace {
 
 struct Options {
-  std::string image, json, picture;
+  std::string image, json, picture, tuning;
+  std::vector<double> from, to;
   double resolution_m = 0.0456;
   int pairs = 1000;
   int compared = 40;
@@ -86,7 +87,67 @@ void draw(const std::string& file, const MapLayer& layer, const std::vector<std:
   if (!cv::imwrite(file, picture)) throw UserError(file + ": cannot be written.");
 }
 
+/// One way with different clearances, cut out round it: what they do, to look at.
+void draw_tuning(const Options& options) {
+  struct Variant {
+    const char* name;
+    double preferred_m, price;
+    cv::Scalar color;
+  };
+  const PlannerTrackerConfig standard;
+  const double preferred_m = standard.clearance.preferred_m, price = standard.clearance.price;
+  const Variant variants[] = {{"as it comes", preferred_m, price, {0, 150, 0}},
+                              {"price 0", preferred_m, 0.0, {0, 0, 220}},
+                              {"price x 4", preferred_m, 4.0 * price, {200, 80, 0}},
+                              {"preferred_m x 3", 3.0 * preferred_m, price, {180, 0, 180}}};
+  const OccupancyGrid grid = grid_from_image(options);
+  const Point2 from{options.from[0], options.from[1]}, to{options.to[0], options.to[1]};
+  constexpr int kScale = 3;
+  const GridGeometry& g = grid.geometry;
+  cv::Mat picture(g.height_cells, g.width_cells, CV_8UC3, cv::Scalar(255, 255, 255));
+  for (int y = 0; y < g.height_cells; ++y) {
+    for (int x = 0; x < g.width_cells; ++x) {
+      if (grid.value[g.index(x, y)] > 50) picture.at<cv::Vec3b>(g.height_cells - 1 - y, x) = {0, 0, 0};
+    }
+  }
+  cv::resize(picture, picture, {}, kScale, kScale, cv::INTER_NEAREST);
+  cv::Rect shown;
+  int row = 0;
+  for (const Variant& variant : variants) {
+    PlannerTrackerConfig config;
+    config.clearance.preferred_m = variant.preferred_m;
+    config.clearance.price = variant.price;
+    CombinedMap map(config.preferred_radius_m() + 0.2, 65, 25);
+    map.set_global({}, grid, {});
+    GridPlanner planner(config);
+    planner.set_map(map.global());
+    PlanResult result;
+    planner.plan(map.global(), from, to, &result);
+    if (result.code != PlanCode::kOk) throw UserError("--tuning: there is no way between these points.");
+    std::vector<cv::Point> line;
+    for (const Point2& p : result.path) {
+      line.emplace_back(static_cast<int>(kScale * (p.x_m - g.origin_x_m) / g.resolution_m),
+                        static_cast<int>(kScale * (g.height_cells - (p.y_m - g.origin_y_m) / g.resolution_m)));
+    }
+    cv::polylines(picture, line, false, variant.color, 2, cv::LINE_AA);
+    const cv::Rect box = cv::boundingRect(line);
+    shown = shown.empty() ? box : (shown | box);
+    fmt::print("{}: {:.2f} m\n", variant.name, result.length_m);
+  }
+  const int rim = static_cast<int>(kScale * 1.2 / g.resolution_m);
+  shown = cv::Rect(shown.x - rim, shown.y - rim, shown.width + 2 * rim, shown.height + 2 * rim) & cv::Rect(0, 0, picture.cols, picture.rows);
+  cv::Mat cut = picture(shown).clone();
+  for (const Variant& variant : variants) {
+    cv::putText(cut, variant.name, {8, 22 + 22 * row++}, cv::FONT_HERSHEY_SIMPLEX, 0.6, variant.color, 2, cv::LINE_AA);
+  }
+  if (!cv::imwrite(options.tuning, cut)) throw UserError(options.tuning + ": cannot be written.");
+}
+
 void run(Options options) {
+  if (!options.tuning.empty()) {
+    if (options.from.size() != 2 || options.to.size() != 2) throw UserError("--tuning: give --from and --to.");
+    return draw_tuning(options);
+  }
   if (options.quick) {
     options.pairs = std::min(options.pairs, 200);
     options.compared = std::min(options.compared, 10);
@@ -181,6 +242,9 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--quick", options.quick, "200 pairs, 10 compared");
   app.add_option("--picture", options.picture, "PNG with the first six paths");
+  app.add_option("--tuning", options.tuning, "instead: PNG of one way planned with different clearances (docs/navigation.md)");
+  app.add_option("--from", options.from, "its start: X Y [m] from the image's lower left corner")->expected(2);
+  app.add_option("--to", options.to, "its end: X Y [m]")->expected(2);
   app.add_option("--json", options.json,
                  "FILE or -: pairs, plan_{median,p99,worst}_ms, unreachable_median_ms, length_median_m, "
                  "length_ratio_{mean,worst} (to Theta*), unsafe_paths, clearance_ms, prepare_ms");

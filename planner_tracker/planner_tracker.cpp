@@ -70,15 +70,20 @@ void PlannerTracker::set_map(const DistanceMap& distance, const OccupancyGrid& o
                              const OccupancyGrid& keepout) {
   state_->map.set_global(distance, occupancy, keepout);
   state_->keeper.set_map(state_->map);
+  state_->moving.reset(state_->map.global());
   state_->next_plan_s = -1.0;
 }
 
 void PlannerTracker::set_local_map(const OccupancyGrid& local, const Pose2& T_map_local) {
-  state_->map.set_local(local, T_map_local, state_->last_step_s);
+  State& s = *state_;
+  s.map.set_local(local, T_map_local, s.last_step_s);
+  if (!s.map.empty()) s.moving.update(s.map.global(), s.map.combined(), s.map.local_window(), s.last_step_s);
 }
 
 void PlannerTracker::clear_local_map() {
-  if (!state_->map.empty()) state_->map.clear_local();
+  if (state_->map.empty()) return;
+  state_->map.clear_local();
+  state_->moving.reset(state_->map.global());
 }
 
 void PlannerTracker::set_scan(const RangeScan& scan, const Pose2& T_base_sensor) {
@@ -104,6 +109,7 @@ Command PlannerTracker::step(double now_s, const RobotState& robot) { return sta
 const Failure& PlannerTracker::failure() const { return state_->failure; }
 const std::string& PlannerTracker::explanation() const { return state_->explanation; }
 const CombinedMap& PlannerTracker::map() const { return state_->map; }
+std::size_t PlannerTracker::plans() const { return state_->plans; }
 
 const std::vector<Point2>& PlannerTracker::path() const {
   state_->keeper.path().rest(&state_->shown_path);
@@ -195,6 +201,7 @@ Command PlannerTracker::State::step(double now_s, const RobotState& robot) {
   input.dt_s = std::clamp(dt, 0.0, 0.1);
   input.layer = &map.combined();
   input.scan = &scan;
+  input.moving = &moving.points();
   Pose2 then = robot.T_odom_base;
   odometry.at(scan.stamp_s(), 1.0, 0.2, &then);
   scan.place(then, robot.T_odom_base);

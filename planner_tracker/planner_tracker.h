@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -109,6 +110,7 @@ class PlannerTracker {
   const std::string& explanation() const;   ///< why the robot does what it does, a sentence; "" = as planned
   const std::vector<Point2>& path() const;  ///< being followed, from the robot on; empty if none
   const CombinedMap& map() const;
+  std::size_t plans() const;  ///< made so far
   /// A plan on the combined map between two points, for make_plan; does not touch the goal.
   PlanResult make_plan(const Point2& start, const Point2& goal, double tolerance_m);
 

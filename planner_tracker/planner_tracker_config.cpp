@@ -2,8 +2,20 @@
 
 namespace knav {
 
+Footprint PlannerTrackerConfig::outline() const {
+  if (footprint.empty()) return Footprint(robot_radius);
+  std::string fault;
+  const Footprint polygon = Footprint::from_text(footprint, &fault);
+  return fault.empty() ? polygon : Footprint(robot_radius);
+}
+
 std::vector<std::string> PlannerTrackerConfig::validate() const {
   std::vector<std::string> faults;
+  if (!footprint.empty()) {
+    std::string fault;
+    Footprint::from_text(footprint, &fault);
+    if (!fault.empty()) faults.push_back(fault);
+  }
   if (clearance.preferred_m < clearance.hard_m) {
     faults.push_back("clearance/preferred_m must not be smaller than clearance/hard_m.");
   }

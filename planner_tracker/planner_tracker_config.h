@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "planner_tracker/footprint.h"
+
 namespace knav {
 
 /// What the robot keeps away from, and how the maps are read.
@@ -33,6 +35,8 @@ struct ClearanceConfig {
 struct PlanningConfig {
   double switch_gain = 0.08;
   double switch_gain_m = 0.30;
+  double hold_s = 4.0;
+  double hold_detour_m = 2.0;
   double controller_patience = 3.0;
   double blocked_timeout_s = 40.0;
   double look_distance_m = 1.8;
@@ -48,6 +52,9 @@ struct PlanningConfig {
     v.number("switch_gain", switch_gain, 0, 1, "",
              "A new plan replaces a passable old one only if it is cheaper by this share ...");
     v.number("switch_gain_m", switch_gain_m, 0, 10, "m", "... and this much.");
+    v.number("hold_s", hold_s, 0, 60, "s",
+             "A way that has just been closed is kept for this long, as whoever walks there walks on, if the way round is longer ...");
+    v.number("hold_detour_m", hold_detour_m, 0, 100, "m", "... by more than this.");
     v.number("controller_patience", controller_patience, 0.1, 60, "s",
              "The robot waits this long before something in its way, replanning, before it tries reactive "
              "avoidance.");
@@ -79,6 +86,8 @@ struct TrackingConfig {
   double horizon_s = 1.5;
   double min_in_place_vel_theta = 0.15;
   double stop_decel_mps2 = 1.0;
+  double moving_mps = 0.25;
+  double moving_distance_m = 0.8;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -92,6 +101,8 @@ struct TrackingConfig {
     v.number("horizon_s", horizon_s, 0.3, 5, "s", "Rollouts look this far ahead.");
     v.number("min_in_place_vel_theta", min_in_place_vel_theta, 0, 1, "rad/s", "Slowest turn in place.");
     v.number("stop_decel_mps2", stop_decel_mps2, 0.1, 10, "m/s^2", "Braking when something is in the way.");
+    v.number("moving_mps", moving_mps, 0.02, 3, "m/s", "Speed right beside what moves or has just appeared; max_vel_x ...");
+    v.number("moving_distance_m", moving_distance_m, 0.05, 5, "m", "... is allowed this far from it.");
   }
 };
 
@@ -150,6 +161,7 @@ struct PlannerTrackerConfig {
   double acc_lim_x = 0.6;
   double acc_lim_theta = 2.5;
   double robot_radius = 0.20;
+  std::string footprint;
   double oscillation_timeout = 12.0;
   double oscillation_distance = 0.30;
   std::string global_frame = "map";
@@ -162,9 +174,12 @@ struct PlannerTrackerConfig {
   RecoveryConfig recovery;
   FreshnessConfig freshness;
 
-  /// The centre keeps this far from everything.
-  double hard_radius_m() const { return robot_radius + clearance.hard_m; }
-  double preferred_radius_m() const { return robot_radius + clearance.preferred_m; }
+  /// The outline; a disc of robot_radius where `footprint` is empty or faulty (see validate()).
+  Footprint outline() const;
+  /// The centre keeps this far from everything, whichever way the robot faces.
+  double hard_radius_m() const { return outline().inscribed_m() + clearance.hard_m; }
+  /// ... and this far where there is room, so that it can face any way.
+  double preferred_radius_m() const { return outline().circumscribed_m() + clearance.preferred_m; }
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -182,7 +197,9 @@ struct PlannerTrackerConfig {
     v.number("max_vel_theta", max_vel_theta, 0.1, 10, "rad/s", "Fastest turn.");
     v.number("acc_lim_x", acc_lim_x, 0.05, 10, "m/s^2", "Acceleration.");
     v.number("acc_lim_theta", acc_lim_theta, 0.1, 50, "rad/s^2", "Acceleration of turns.");
-    v.number("robot_radius", robot_radius, 0.02, 2, "m", "Footprint, a disc round base_link.");
+    v.number("robot_radius", robot_radius, 0.02, 2, "m", "Footprint, a disc round base_link, where `footprint` is empty.");
+    v.text("footprint", footprint,
+           "Footprint, a polygon with base_link inside, as \"[[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]\" (m).");
     v.number("oscillation_timeout", oscillation_timeout, 0, 600, "s",
              "Driving for this long without leaving oscillation_distance calls for reactive avoidance; 0 = "
              "never.");

@@ -11,6 +11,7 @@ constexpr double kArrived_m = 0.15;
 constexpr double kFacing_rad = 0.2;
 constexpr double kStandsBefore_m = 0.8;    ///< what closes the way, and the robot's radius, reach this far before the point
 constexpr double kEnoughFarther_m = 0.15;  ///< less is not worth backing up for
+constexpr double kLongEnough_s = 5.0;      ///< looked from one place
 constexpr double kFreeBehind_m = 0.25;
 constexpr double kJustDriven_s = 12.0, kBesideTrack_m = 0.1;
 
@@ -24,9 +25,18 @@ bool PlannerTracker::State::looking(double now_s, const RobotState& robot) {
   const bool arrived = path.remaining_m() + path.offset_m() < kArrived_m;
   const bool in_view = closed && distance < config.planning.look_distance_m + kArrived_m &&
                        tracker.straight_free_m(input, bearing, distance) > distance - kStandsBefore_m;
-  if (in_view && backing_up(now_s, robot, keeper.at())) return true;
-  if (!arrived && (!in_view || distance < config.planning.too_near_m())) return false;
+  const bool holding = keeper.holding();
+  // On its way to another place to look from: it has seen all there is to see from here.
+  if (keeper.elsewhere() && !arrived) return false;
+  if (in_view && !holding && backing_up(now_s, robot, keeper.at())) return true;
+  if (!arrived && (!in_view || (!holding && distance < config.planning.too_near_m()))) return false;
   if (looking_since_s < 0.0) looking_since_s = now_s;
+  if ((closed || outcome == PlanKeeper::Outcome::kToNearby) && !holding && now_s - looking_since_s > kLongEnough_s) {
+    // Nothing new from here: what hides the place from here may not hide it from there.
+    keeper.look_elsewhere();
+    next_plan_s = now_s;
+    looking_since_s = -1.0;
+  }
   act(Activity::kWaiting, std::abs(bearing) > kFacing_rad ? tracker.turn(input, bearing) : tracker.stop(input));
   return true;
 }
@@ -59,7 +69,7 @@ bool PlannerTracker::State::backing_up(double now_s, const RobotState& robot, co
     return false;
   }
   const double behind_m =
-      std::min(scan.free_m(kPi, tracker.stop_radius_m(), false), just_driven_behind_m(robot.T_odom_base));
+      std::min(scan.free_m(kPi, tracker.safe_radius_m(), false), just_driven_behind_m(robot.T_odom_base));
   if (behind_m < (moving ? 0.1 : kFreeBehind_m)) return false;
   if (near_since_s < 0.0) near_since_s = now_s;
   if (now_s - near_since_s < config.planning.back_up_after_s) {

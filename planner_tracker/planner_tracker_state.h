@@ -4,6 +4,7 @@
 
 #include "core/pose_buffer.h"
 #include "planner_tracker/goal_watch.h"
+#include "planner_tracker/moving_cells.h"
 #include "planner_tracker/path_tracker.h"
 #include "planner_tracker/plan_keeper.h"
 #include "planner_tracker/planner_tracker.h"
@@ -58,6 +59,7 @@ struct PlannerTracker::State {
 
   PlannerTrackerConfig config;
   CombinedMap map;
+  MovingCells moving;
   PlanKeeper keeper;
   PathTracker tracker;
   RandomMoves moves;
@@ -88,6 +90,7 @@ struct PlannerTracker::State {
   double lost_since_s = -1.0, found_since_s = -1.0, turned_rad = 0.0, last_yaw_rad = 0.0;
   bool lost_turn_done = false;
   Pose2 T_odom_lost;
+  std::size_t plans = 0;
   PlanResult asked;  ///< for make_plan
 };
 

@@ -9,7 +9,6 @@
 namespace knav {
 namespace {
 
-constexpr double kFoundFor_s = 0.5;        ///< localized for this long ends the recovery
 constexpr double kFailedPlanWait_s = 1.0;  ///< a search that finds nothing is the dearest
 constexpr double kFloorSeenFrom_m = 1.2;  ///< nearer, a level Kinect at 0.5 m does not see the floor
 
@@ -60,81 +59,6 @@ bool PlannerTracker::State::stopped_by_missing_data(double now_s, const RobotSta
   return true;
 }
 
-double PlannerTracker::State::free_way(const RobotState&, double bearing_rad, bool localized) const {
-  constexpr double kFar_m = 1.5;
-  const double radius = tracker.stop_radius_m();
-  if (localized) {
-    // By scan and map together, as far as the footprint goes; known only.
-    return tracker.straight_free_m(input, bearing_rad, kFar_m);
-  }
-  // The map is of no use: only where the scan knows what is there.
-  return std::min(kFar_m, scan.free_m(bearing_rad, radius + config.clearance.hard_m, true));
-}
-
-bool PlannerTracker::State::stopped_by_lost(double now_s, const RobotState& robot) {
-  const bool lost = robot.localization == LocalizationState::kLost;
-  if (lost_since_s < 0.0) {
-    if (!lost) return false;
-    lost_since_s = now_s;
-    lost_turn_done = false;
-    turned_rad = 0.0;
-    last_yaw_rad = robot.T_odom_base.yaw_rad;
-    T_odom_lost = robot.T_odom_base;
-    moves.end();
-    keeper.start_goal();
-    explain("The localizer does not know where the robot is.");
-  }
-  if (!lost) {
-    // Not on the first good word: stands until it is sure.
-    if (found_since_s < 0.0) found_since_s = now_s;
-    act(Activity::kLostTurning, tracker.stop(input));
-    if (now_s - found_since_s < kFoundFor_s) return true;
-    lost_since_s = found_since_s = -1.0;
-    moves.end();
-    explain("");
-    next_plan_s = -1.0;
-    watch.start(now_s);
-    return false;
-  }
-  found_since_s = -1.0;
-  if (now_s - lost_since_s > config.recovery.lost_timeout_s) {
-    fail(FailureCode::kLost, position(robot.T_map_base),
-         fmt::format("Not localized for {:.0f} s, after looking round and wandering.",
-                     config.recovery.lost_timeout_s));
-    return true;
-  }
-  turned_rad += normalize_angle_rad(robot.T_odom_base.yaw_rad - last_yaw_rad);
-  last_yaw_rad = robot.T_odom_base.yaw_rad;
-  if (!lost_turn_done && std::abs(turned_rad) < 2.0 * kPi) {
-    TrackOutput turn = tracker.stop(input);
-    const double step = config.acc_lim_theta * input.dt_s;
-    if (std::abs(turn.v_mps) < 0.01) {
-      turn.w_radps = std::clamp(config.recovery.lost_turn_radps, input.w_radps - step, input.w_radps + step);
-    }
-    act(Activity::kLostTurning, turn);
-    return true;
-  }
-  if (!lost_turn_done) {
-    lost_turn_done = true;
-    moves.start(3);
-  }
-  if (!moves.active()) {
-    // Looks round again from the new place.
-    lost_turn_done = false;
-    turned_rad = 0.0;
-    act(Activity::kLostWandering, tracker.stop(input));
-    return true;
-  }
-  const TrackOutput move = moves.step(input, robot.T_odom_base, [&](double bearing) {
-    const double way = free_way(robot, bearing, false);
-    const Pose2 end = robot.T_odom_base * Pose2{way * std::cos(bearing), way * std::sin(bearing), 0.0};
-    const double beyond = distance_m(end, T_odom_lost) - config.recovery.wander_radius_m;
-    return beyond > 0.0 ? way - beyond : way;
-  });
-  act(Activity::kLostWandering, move);
-  return true;
-}
-
 bool PlannerTracker::State::arrived(const RobotState& robot) {
   const Pose2 T_base_goal = robot.T_map_base.inverse() * goal;
   const double distance = std::hypot(T_base_goal.x_m, T_base_goal.y_m);
@@ -158,8 +82,16 @@ bool PlannerTracker::State::arrived(const RobotState& robot) {
     command.finished = true;
     return true;
   }
-  act(Activity::kAligning,
-      std::abs(error) < 0.5 * config.yaw_goal_tolerance ? tracker.stop(input) : tracker.turn(input, error));
+  const TrackOutput turn = std::abs(error) < 0.5 * config.yaw_goal_tolerance ? tracker.stop(input) : tracker.turn(input, error);
+  if (turn.kind != TrackOutput::Kind::kBlocked) {
+    blocked_since_s = -1.0;
+  } else if (blocked_since_s < 0.0) {
+    blocked_since_s = last_step_s;
+  } else if (last_step_s - blocked_since_s > config.planning.blocked_timeout_s) {
+    fail(FailureCode::kBlocked, position(robot.T_map_base), "The robot stands at the goal but has no room to turn to its heading.");
+    return true;
+  }
+  act(Activity::kAligning, turn);
   return true;
 }
 
@@ -167,7 +99,8 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
   if (now_s < next_plan_s) return false;
   next_plan_s = now_s + 1.0 / config.planner_frequency - 0.5 / config.controller_frequency;
   const bool first = goal_allowed_s > 1e8;
-  outcome = keeper.replan(map, position(robot.T_map_base), position(goal));
+  ++plans;
+  outcome = keeper.replan(map, robot.T_map_base, position(goal), now_s);
   using Outcome = PlanKeeper::Outcome;
   // There was a way to this goal before: it is where the robot stands that has none.
   if (outcome == Outcome::kNoPath && !first) outcome = Outcome::kStartBlocked;
@@ -180,8 +113,10 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
       explain("Something stands on the goal; going near it.");
       break;
     case Outcome::kToBlockage:
-      next_plan_s = now_s + kFailedPlanWait_s;
-      explanation = fmt::format("The way is closed at ({:.2f}, {:.2f}) m.", at.x_m, at.y_m);
+      if (!keeper.holding()) next_plan_s = now_s + kFailedPlanWait_s;
+      explanation = fmt::format(keeper.holding() ? "Something has come into the way at ({:.2f}, {:.2f}) m; it may move on."
+                                                 : "The way is closed at ({:.2f}, {:.2f}) m.",
+                                at.x_m, at.y_m);
       break;
     case Outcome::kGoalOccupied:
       fail(
@@ -210,7 +145,7 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
 
 bool PlannerTracker::State::given_up(double now_s, const RobotState& robot) {
   keeper.path().advance(position(robot.T_map_base));
-  watch.progress(now_s, keeper.path().remaining_m() + keeper.path().offset_m(), keeper.switched());
+  watch.progress(now_s, keeper.path().remaining_m() + keeper.path().offset_m(), keeper.switched() && !keeper.elsewhere());
   const bool stuck = watch.without_progress_s(now_s) > config.planning.blocked_timeout_s;
   const bool slow = now_s - goal_start_s > goal_allowed_s;
   if (!stuck && !slow) return false;
@@ -287,7 +222,7 @@ void PlannerTracker::State::drive(double now_s, const RobotState& robot) {
     // A goal just overshot, straight behind: back up over what was just driven, if it is still seen free.
     const Point2 p = robot.T_map_base.inverse() * position(goal);
     if (p.x_m < -0.02 && std::abs(p.y_m) < 0.3 * std::abs(p.x_m) &&
-        scan.free_m(kPi, tracker.stop_radius_m(), true) > -p.x_m + 0.05) {
+        scan.free_m(kPi, tracker.safe_radius_m(), true) > -p.x_m + 0.05) {
       const TrackOutput back = tracker.creep(input, p.x_m);
       if (back.kind != TrackOutput::Kind::kBlocked) {
         act(Activity::kDriving, back);

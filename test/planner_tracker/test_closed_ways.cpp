@@ -26,7 +26,7 @@ Point2 end_of_way(const Point2& robot, Point2* closed_at) {
   map.set_local(two_rooms(false), Pose2{});
   PlanKeeper keeper(config);
   keeper.set_map(map);
-  EXPECT_EQ(keeper.replan(map, robot, {10.0, 3.0}), PlanKeeper::Outcome::kToBlockage);
+  EXPECT_EQ(keeper.replan(map, {robot.x_m, robot.y_m, 0.0}, {10.0, 3.0}, 100.0), PlanKeeper::Outcome::kToBlockage);
   *closed_at = keeper.at();
   return keeper.path().end();
 }
@@ -71,6 +71,81 @@ TEST(ClosedWay, TheRobotBacksUpFromSomebodyWithItsEyesOnHimUntilHeIsGone) {
   EXPECT_EQ(world.avoidances, 0);
   EXPECT_EQ(world.collisions, 0);
   EXPECT_LE(world.reversals, 2) << "back once, and on";
+}
+
+TEST(ClosedWay, IsLookedAtFromElsewhereIfNothingIsSeenFromHereAndGivenUpInTimeAllTheSame) {
+  // A door that is shut, seen from a room: the robot looks from two places at least, and does not go on like that for ever.
+  ToyWorld world(two_rooms(false), two_rooms(true), {1.5, 3.0, 0.0});
+  world.planner.set_goal({10.0, 3.0, 0.0});
+  const double began_s = world.now_s;
+  std::vector<Point2> stood;
+  Command command;
+  for (int i = 0; i < 2400 && !command.finished; ++i) {
+    command = world.step();
+    const Point2 p{world.T_map_base.x_m, world.T_map_base.y_m};
+    if (command.activity != Activity::kWaiting || std::abs(world.v_mps) > 0.01) continue;
+    if (stood.empty() || distance(stood.back(), p) > 0.4) stood.push_back(p);
+  }
+  ASSERT_EQ(command.activity, Activity::kFailed);
+  EXPECT_EQ(world.planner.failure().code, FailureCode::kBlocked);
+  EXPECT_NEAR(world.planner.failure().at.x_m, 5.7, 0.3);
+  EXPECT_GE(stood.size(), 2u);
+  EXPECT_LT(world.now_s - began_s, 60.0);
+  EXPECT_EQ(world.collisions, 0);
+}
+
+TEST(ClosedWay, WhenEveryWaySeemsClosedTheNextOneIsLookedAtAfterTheNearest) {
+  // Two doors. The nearer is shut. Before the farther somebody stood when the robot last saw it, and has left since.
+  OccupancyGrid map = room(12.0, 6.0);
+  fill(&map, 5.95, 0.0, 6.05, 6.0, 100);
+  fill(&map, 5.95, 0.6, 6.05, 1.5, 0);
+  fill(&map, 5.95, 4.5, 6.05, 5.4, 0);
+  OccupancyGrid truth = map;
+  fill(&truth, 5.95, 0.6, 6.05, 1.5, 100);
+  ToyWorld world(truth, map, {2.5, 3.4, 0.6}, {});
+  const double began_s = world.now_s;
+  world.discs.push_back({[=](double t) { return t - began_s < 2.5 ? Point2{5.7, 4.95} : Point2{-5.0, 0.0}; }});
+  for (int i = 0; i < 40; ++i) world.step();
+  world.sees_free_from_m = 1.3;
+  world.planner.set_goal({10.0, 1.0, 0.0});
+  EXPECT_EQ(world.run(120.0).activity, Activity::kReached) << world.planner.failure().reason;
+  EXPECT_EQ(world.collisions, 0);
+}
+
+/// A corridor, and a way round it that is 10 m longer.
+OccupancyGrid corridor_and_detour() {
+  OccupancyGrid grid = room(14.0, 6.0);
+  fill(&grid, 2.0, 1.3, 12.0, 4.7, 100);
+  return grid;
+}
+
+TEST(ClosedWay, ARobotWhoseCorridorSomebodyCrossesWaitsAndDoesNotTurnRoundForTheWayRound) {
+  const OccupancyGrid grid = corridor_and_detour();
+  ToyWorld world(grid, grid, {2.5, 0.65, 0.0});
+  const double began_s = world.now_s;
+  // Stands in the corridor for 3 s, then leaves through the wall.
+  world.discs.push_back({[=](double t) { return t - began_s > 2.0 && t - began_s < 5.0 ? Point2{7.0, 0.65} : Point2{-5.0, 0.0}; }});
+  world.planner.set_goal({11.5, 0.65, 0.0});
+  double turned_rad = 0.0;
+  Command command;
+  for (int i = 0; i < 1200 && !command.finished; ++i) {
+    command = world.step();
+    turned_rad = std::max(turned_rad, std::abs(world.T_map_base.yaw_rad));
+  }
+  EXPECT_EQ(command.activity, Activity::kReached);
+  EXPECT_LT(turned_rad, 1.0) << "it turned round";
+  EXPECT_LT(world.now_s - began_s, 27.0);
+  EXPECT_EQ(world.collisions, 0);
+}
+
+TEST(ClosedWay, ARobotWhoseCorridorStaysClosedTakesTheWayRound) {
+  const OccupancyGrid grid = corridor_and_detour();
+  ToyWorld world(grid, grid, {2.5, 0.65, 0.0});
+  world.discs.push_back({[](double) { return Point2{7.0, 0.65}; }});
+  world.planner.set_goal({11.5, 0.65, 0.0});
+  EXPECT_EQ(world.run(90.0).activity, Activity::kReached);
+  EXPECT_GT(world.driven_m, 15.0);
+  EXPECT_EQ(world.collisions, 0);
 }
 
 TEST(ClosedWay, BacksUpOnlyOverGroundItHasJustDriven) {

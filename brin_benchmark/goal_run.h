@@ -1,0 +1,55 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "brin_benchmark/benchmark.h"
+#include "brin_benchmark/goal_suite.h"
+
+namespace knav {
+
+/// How a goal went.
+struct GoalResult {
+  SuiteGoal goal;
+  bool reached = false;
+  int failure_code = 0;            ///< of NavigationFailure; 0 if it ran out of time
+  std::string reason;              ///< of those not reached
+  double reason_off_m = 0.0;       ///< blocked: from the point it names to the closed door
+  double time_s = 0.0, distance_m = 0.0;
+  double standing_s = 0.0;         ///< of time_s, neither moving nor turning
+  double estimate_off_m = 0.0;     ///< reached: where the localizer says it stands, to the goal
+  double true_off_m = 0.0;         ///< reached: where it stands
+  int turned_round = 0, sways = 0;
+  int collisions = 0, walker_contacts = 0;
+  double moved_after_mps = 0.0;    ///< largest command within a second after the end; |v| + |w|
+  double lost_s = 0.0;             ///< of time_s, the localizer said lost
+
+  bool right() const {
+    return goal.expected == Expected::kReached ? reached : right_reason(goal.expected, static_cast<FailureCode>(failure_code));
+  }
+};
+
+struct GoalRunResult {
+  std::string name;
+  std::vector<GoalResult> goals;
+  double time_s = 0.0, distance_m = 0.0;
+  double wall_s = 0.0, frame_cost_ms = 0.0;
+  double driving_s = 0.0;        ///< of time_s, while the planner followed a plan
+  int plans = 0;                 ///< made in that time
+  double control_max_ms = 0.0;   ///< the longest control step, with its planning
+};
+
+struct GoalRunRecord {
+  GoalRunResult result;
+  Trajectory truth, estimate;
+  std::vector<Point2> failed_at;
+};
+
+/// Sends the robot to a run's goals in lock-step. One not reached that could be is looked into (recorder), and the robot is set
+/// down there.
+GoalRunRecord drive_goals(const SimulatorConfig& simulator, const NavigationStackConfig& stack, const WorldConfig& changed,
+                          const MapDirectory& map, const Pose2& T_world_map, const SuiteRun& run,
+                          const BenchmarkProgress& progress, FlightRecorder* recorder = nullptr);
+
+}  // namespace knav

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/pose2.h"
+#include "planner_tracker/combined_map.h"
+
+namespace knav {
+
+/// Which of the cells that the local map shows occupied have only just become so, where nothing stood: somebody walks there, or
+/// something was put down. As far as the robot's own data tell: a contour that shifts by a cell or two as the local map is
+/// aligned is no motion; but furniture that the global map does not have counts for a second when it first comes into view.
+class MovingCells {
+ public:
+  static constexpr double kFresh_s = 1.0;  ///< a cell counts for so long
+  static constexpr int kShift_cells = 3;   ///< what lies so near to something that stood there before is that
+  static constexpr std::size_t kFewest = 4;  ///< cells; fewer are noise
+
+  void reset(const MapLayer& layer);
+  /// Call after every new local map. @param window  of the cells that it covers
+  void update(const MapLayer& global, const MapLayer& combined, const CellWindow& window, double now_s);
+
+  /// In the map.
+  const std::vector<Point2>& points() const { return points_; }
+
+ private:
+  bool stood_near(const MapLayer& global, int ix, int iy, double now_s) const;
+
+  GridGeometry geometry_;
+  // Per cell, seconds; 0 = never.
+  std::vector<float> occupied_from_s_, occupied_to_s_;
+  double begin_s_ = -1.0;  ///< stamps count from here: a float holds the milliseconds of a day, not of an epoch
+  std::vector<Point2> points_;
+};
+
+}  // namespace knav
