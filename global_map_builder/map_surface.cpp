@@ -97,9 +97,9 @@ GridGeometry surface_extent(const MapBuilderConfig& config, const std::vector<Dr
   return geometry;
 }
 
-std::vector<float> build_surface(const MapBuilderConfig& config, const std::vector<Drive>& drives,
-                                 const std::vector<CorrectedDrive>& corrected, const GridGeometry& geometry,
-                                 const std::function<void(double)>& report) {
+MapSurface build_surface(const MapBuilderConfig& config, const std::vector<Drive>& drives,
+                         const std::vector<CorrectedDrive>& corrected, const GridGeometry& geometry,
+                         const std::function<void(double)>& report) {
   DenseTsdf whole(geometry, config.surface);
   for (std::size_t d = 0; d < drives.size(); ++d) {
     const auto part = [&](double fraction) {
@@ -113,9 +113,14 @@ std::vector<float> build_surface(const MapBuilderConfig& config, const std::vect
     integrate(config, drives[d], corrected[d], part, &newer);
     whole.renew(newer);
   }
-  std::vector<float> value(geometry.cell_count());
-  for (std::size_t i = 0; i < value.size(); ++i) value[i] = whole.distance_m(i);
-  return value;
+  MapSurface surface;
+  surface.value_m.resize(geometry.cell_count());
+  surface.measured.resize(geometry.cell_count());
+  for (std::size_t i = 0; i < surface.value_m.size(); ++i) {
+    surface.value_m[i] = whole.distance_m(i);
+    surface.measured[i] = whole.measured(i);
+  }
+  return surface;
 }
 
 OccupancyGrid uncorrected_map(const MapBuilderConfig& config, const std::vector<Drive>& drives,
@@ -141,7 +146,8 @@ OccupancyGrid uncorrected_map(const MapBuilderConfig& config, const std::vector<
   grid.value.assign(grid.geometry.cell_count(), -1);
   constexpr std::size_t kMaxCells = 40'000'000;  // a runaway estimate is not worth the memory
   if (grid.value.size() > kMaxCells) return {};
-  const std::vector<float> value = build_surface(coarse, thinned, rigid, grid.geometry, [](double) {});
+  const std::vector<float> value =
+      build_surface(coarse, thinned, rigid, grid.geometry, [](double) {}).value_m;
   for (std::size_t i = 0; i < value.size(); ++i) {
     if (!std::isnan(value[i])) grid.value[i] = value[i] > 0.0f ? 0 : 100;
   }

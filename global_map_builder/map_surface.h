@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -18,11 +19,16 @@ std::vector<CorrectedDrive> corrected_drives(const std::vector<Drive>& drives,
 GridGeometry surface_extent(const MapBuilderConfig& config, const std::vector<Drive>& drives,
                             const std::vector<CorrectedDrive>& corrected);
 
-/// One surface of all drives, the newer correcting the older: signed distance [m] a cell, NaN unknown.
+struct MapSurface {
+  std::vector<float> value_m;          ///< signed distance a cell, NaN unknown
+  std::vector<std::uint8_t> measured;  ///< where readings ended, see DenseTsdf
+};
+
+/// One surface of all drives, the newer correcting the older.
 /// @param report called with the fraction done; may throw to stop
-std::vector<float> build_surface(const MapBuilderConfig& config, const std::vector<Drive>& drives,
-                                 const std::vector<CorrectedDrive>& corrected, const GridGeometry& geometry,
-                                 const std::function<void(double)>& report);
+MapSurface build_surface(const MapBuilderConfig& config, const std::vector<Drive>& drives,
+                         const std::vector<CorrectedDrive>& corrected, const GridGeometry& geometry,
+                         const std::function<void(double)>& report);
 
 /// What the map would be without closures: coarse, for a picture.
 OccupancyGrid uncorrected_map(const MapBuilderConfig& config, const std::vector<Drive>& drives,
