@@ -12,6 +12,7 @@
 #include "global_map_builder/closure_finder.h"
 #include "global_map_builder/contour_distance.h"
 #include "global_map_builder/drive_smoother.h"
+#include "global_map_builder/joint_refiner.h"
 #include "global_map_builder/map_occupancy.h"
 #include "global_map_builder/map_surface.h"
 
@@ -187,12 +188,18 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
     built.graph = finder.graph();
     built.record.closures = finder.closures();
   }
-  for (const auto& [id, pose] : built.graph.nodes) built.record.T_map_keyframe.push_back(pose);
   end_stage("closures");
+
+  const JointRefinement joint = refine_jointly(config_.joint, drives, built.graph, config_.graph.robust_scale,
+                                               [&](double fraction) { report("fitting", fraction); });
+  built.record.T_map_keyframe = joint.T_map_keyframe;
+  if (joint.kept) built.fitted_pairs = joint.pairs;
+  for (auto& [id, pose] : built.graph.nodes) pose = joint.T_map_keyframe[static_cast<std::size_t>(id)];
+  end_stage("fitting");
 
   const std::vector<CorrectedDrive> corrected = corrected_drives(drives, built.record.T_map_keyframe);
   GridGeometry geometry = surface_extent(config_, drives, corrected);
-  MapSurface surface = build_surface(config_, drives, corrected, geometry,
+  MapSurface surface = build_surface(config_, drives, corrected, joint.offset, geometry,
                                      [&](double fraction) { report("surface", fraction); });
   const Crop part = known_part(geometry, surface.value_m);
   crop(part, geometry, &surface.value_m);

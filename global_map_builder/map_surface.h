@@ -7,6 +7,7 @@
 #include "core/grid_geometry.h"
 #include "global_map_builder/corrected_drive.h"
 #include "global_map_builder/map_builder_config.h"
+#include "global_map_builder/range_offset.h"
 
 namespace knav {
 
@@ -25,10 +26,11 @@ struct MapSurface {
 };
 
 /// One surface of all drives, the newer correcting the older.
+/// @param offset one a drive, taken out of its depths
 /// @param report called with the fraction done; may throw to stop
 MapSurface build_surface(const MapBuilderConfig& config, const std::vector<Drive>& drives,
-                         const std::vector<CorrectedDrive>& corrected, const GridGeometry& geometry,
-                         const std::function<void(double)>& report);
+                         const std::vector<CorrectedDrive>& corrected, const std::vector<RangeOffset>& offset,
+                         const GridGeometry& geometry, const std::function<void(double)>& report);
 
 /// What the map would be without closures: coarse, for a picture.
 OccupancyGrid uncorrected_map(const MapBuilderConfig& config, const std::vector<Drive>& drives,
