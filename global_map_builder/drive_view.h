@@ -30,6 +30,8 @@ class DriveView {
   DriveView(const Drive& drive, int keyframe);
 
   bool empty() const { return points_.empty(); }
+  bool depth_camera() const { return pinhole_; }
+  /// The sensor, in the keyframe's frame.
   Eigen::Vector2d eye() const { return {T_keyframe_sensor_.x_m, T_keyframe_sensor_.y_m}; }
   const std::vector<ViewPoint>& points() const { return points_; }
   /// Points and normals with this offset taken out.
