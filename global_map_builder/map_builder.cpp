@@ -190,7 +190,11 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
   }
   end_stage("closures");
 
-  const JointRefinement joint = refine_jointly(config_.joint, drives, built.graph, config_.graph.robust_scale,
+  // Without a closure nothing holds the far end of a drive against a few wrong pairs (seen: 0.25 to 0.41 m).
+  JointRefinementConfig fitting = config_.joint;
+  fitting.enabled = fitting.enabled && std::any_of(built.record.closures.begin(), built.record.closures.end(),
+                                                   [](const Closure& c) { return c.accepted; });
+  const JointRefinement joint = refine_jointly(fitting, drives, built.graph, config_.graph.robust_scale,
                                                [&](double fraction) { report("fitting", fraction); });
   built.record.T_map_keyframe = joint.T_map_keyframe;
   if (joint.kept) built.fitted_pairs = joint.pairs;
