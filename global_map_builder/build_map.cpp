@@ -30,9 +30,9 @@ DIR receives map.yaml, map.pgm (map_server's format), distance.tiff (float32 m, 
 places.yaml, trajectory.tum, graph.g2o, closures.json, closures.yaml (the allow / deny list), report.html, map.png,
 drives.bin (what --extend needs), changes.json (with --extend) and metadata.yaml.
 The JSON of --json holds source, observations (count), frames_used, drives, path_m, keyframes, marks, breaks (times the
-mapper lost the thread), mended_steps (its jumps, mended), closures {found, accepted, button, automatic, located,
+mapper lost the thread), mended_steps (its jumps, mended), fitted_pairs (of keyframes whose views were fitted), closures {found, accepted, button, automatic, located,
 list}, graph {chi2, edges}, map {width_m, height_m, contour_m, checksum}, changes (count), time_s {read, refinement,
-closures, surface, distance, write, total}, recording_s, memory_mb, seed.
+closures, fitting, surface, distance, write, total}, recording_s, memory_mb, seed.
 closures.json holds, for each, from_drive, to_drive, from_stamp_s, to_stamp_s, source, verdict (of the list), matched,
 accepted, reason, x_m, y_m, yaw_rad (of the later pose in the earlier), score, overlap, agreement, residual_m, rival,
 chi2. changes.json holds, for each area, now (occupied or free), x_m, y_m (its middle), width_m, height_m, wall_m.)";
@@ -236,6 +236,7 @@ void build_map(const Options& options) {
   json["time_s"] = {{"read", read_s},
                     {"refinement", built.stage_s["refinement"]},
                     {"closures", built.stage_s["closures"]},
+                    {"fitting", built.stage_s["fitting"]},
                     {"surface", built.stage_s["surface"]},
                     {"distance", built.stage_s["distance"]},
                     {"write", seconds_since(write_start)},

@@ -35,6 +35,7 @@ bool row_span(const TsdfObservation& o, float cos_yaw, float sin_yaw, double dy,
 }
 
 constexpr int kChunk = 256;
+constexpr double kEnd_cells = 1.5;
 
 /// Which column of the observation sees each cell of a row, -1 for none, and the cells' squared distances.
 struct RowProjection {
@@ -103,6 +104,7 @@ DenseTsdf::DenseTsdf(const GridGeometry& geometry, const SurfaceConfig& config)
       min_looks_(config.min_looks),
       sum_(geometry.cell_count()),
       weight_(geometry.cell_count()),
+      ended_(geometry.cell_count()),
       looks_(geometry.cell_count()) {}
 
 float DenseTsdf::distance_m(std::size_t i) const {
@@ -119,10 +121,12 @@ void DenseTsdf::renew(const DenseTsdf& later) {
     if (std::isnan(before) || (std::fabs(before - now) > tolerance && later.weight_[i] >= enough)) {
       sum_[i] = later.sum_[i];
       weight_[i] = later.weight_[i];
+      ended_[i] = later.ended_[i];
       looks_[i] = later.looks_[i];
     } else if (std::fabs(before - now) <= tolerance) {
       sum_[i] += later.sum_[i];
       weight_[i] += later.weight_[i];
+      ended_[i] += later.ended_[i];
       looks_[i] = static_cast<std::uint16_t>(std::min(0xFFFF, looks_[i] + later.looks_[i]));
     }
   }
@@ -174,6 +178,7 @@ void DenseTsdf::update(const TsdfObservation& o, std::size_t first, int count, c
       static_cast<float>(config_.behind_m - config_.front_m);  // added to the column's mu
   const auto floor2 = static_cast<float>(config_.weight_range_floor_m * config_.weight_range_floor_m);
   const auto power = static_cast<float>(-config_.weight_power / 2.0);
+  const auto end = static_cast<float>(kEnd_cells * geometry_.resolution_m);
   const bool fourth = config_.weight_power == 4.0, second = config_.weight_power == 2.0;
   for (int n = 0; n < count; ++n) {
     if (column[n] < 0) continue;
@@ -191,6 +196,7 @@ void DenseTsdf::update(const TsdfObservation& o, std::size_t first, int count, c
     const std::size_t i = first + static_cast<std::size_t>(n);
     sum_[i] += w * value;
     weight_[i] += w;
+    if (near_surface && std::fabs(eta) < end) ended_[i] += w;
     if (looks_[i] < 0xFFFF) ++looks_[i];
   }
 }

@@ -64,16 +64,22 @@ class DenseTsdf {
   /// Signed distance [m] along the rays, NaN where unknown.
   float distance_m(std::size_t i) const;
   float weight(std::size_t i) const { return weight_[i]; }
+  /// Did readings end in the cell, in proportion to those that passed it? Between an open cell and one behind a
+  /// surface lies either that surface or the edge of a shadow, in which none ends.
+  bool measured(std::size_t i) const { return ended_[i] > kMeasuredShare * weight_[i]; }
 
  private:
   void add_row(const TsdfObservation& observation, int iy, int from, int to);
   void update(const TsdfObservation& observation, std::size_t first, int count, const std::int32_t* column,
               const float* square);
 
+  static constexpr float kMeasuredShare = 0.1f;
+
   GridGeometry geometry_;
   SurfaceConfig config_;
   int min_looks_;
   std::vector<float> sum_, weight_;
+  std::vector<float> ended_;  ///< the share of the weight whose readings ended within kEnd_cells
   std::vector<std::uint16_t> looks_;
 };
 

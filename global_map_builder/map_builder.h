@@ -26,6 +26,7 @@ struct BuiltMap {
   std::vector<MapChange> changes;  ///< against the map that was extended
   int old_drives = 0;              ///< of the map that was extended
   int mended_steps = 0;            ///< where the mapper jumped
+  std::size_t fitted_pairs = 0;    ///< of keyframes, in the joint refinement; 0 if it was not kept
   std::map<std::string, double> stage_s;
 };
 

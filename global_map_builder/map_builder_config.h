@@ -155,11 +155,44 @@ struct RefinementConfig {
   }
 };
 
+/// Bending the whole drive until all that was seen fits together, after the closures.
+struct JointRefinementConfig {
+  bool enabled = true;
+  int max_partners = 30;
+  double min_path_m = 0.9;
+  double max_apart_m = 20.0;
+  double min_shared = 0.12;
+  double gate_m = 0.4;
+  double point_weight = 0.005;
+  double offset_sd_per_m = 0.001;
+  int rounds = 2;
+  int steps = 6;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.flag("enabled", enabled, "Fit all keyframes' views together.");
+    v.integer("max_partners", max_partners, 1, 1000, "",
+              "Each keyframe is compared with so many earlier ones, spread evenly over those that see the same.");
+    v.number("min_path_m", min_path_m, 0.1, 100, "m", "Keyframes nearer than this along the drive are not compared.");
+    v.number("max_apart_m", max_apart_m, 1, 100, "m", "Neither are those farther apart than this.");
+    v.number("min_shared", min_shared, 0.05, 1, "", "Share of a view that the other must see.");
+    v.number("gate_m", gate_m, 0.05, 5, "m", "Surfaces farther apart than this are two.");
+    v.number("point_weight", point_weight, 1e-4, 1, "",
+             "Weight of a point beside the graph's edges: neighbouring readings and frames share their errors.");
+    v.number("offset_sd_per_m", offset_sd_per_m, 1e-7, 0.05, "1/m",
+             "How wrong a depth camera's disparity may steadily be, column against column (sd; 0.001 is 1 % at 10 m).");
+    v.integer("rounds", rounds, 1, 100, "", "Times that views are paired anew.");
+    v.integer("steps", steps, 1, 100, "", "Steps a round.");
+  }
+  std::vector<std::string> validate() const { return {}; }
+};
+
 struct MapBuilderConfig {
   DriveConfig drive;
   RefinementConfig refinement;
   ClosureConfig closures;
   GraphOptimizerConfig graph;
+  JointRefinementConfig joint;
   SurfaceConfig surface;
   double min_contour_piece_m = 0.25;
   double robot_radius_m = 0.20;
@@ -173,6 +206,7 @@ struct MapBuilderConfig {
     v.group("refinement", refinement, "Direct alignment along the drive.");
     v.group("closures", closures, "Visits of the same place.");
     v.group("graph", graph, "The optimiser.");
+    v.group("joint", joint, "Fitting all views together.");
     v.group("surface", surface, "The map's signed distance grid.");
     v.number("min_contour_piece_m", min_contour_piece_m, 0, 5, "m", "Shorter pieces of contour are noise.");
     v.number("robot_radius_m", robot_radius_m, 0, 2, "m",

@@ -30,7 +30,8 @@ void saddle(int pattern, bool middle_positive, SidePair out[2]) {
 
 }  // namespace
 
-Contour extract_zero_level(const GridGeometry& geometry, const std::vector<float>& value_m) {
+Contour extract_zero_level(const GridGeometry& geometry, const std::vector<float>& value_m,
+                           const std::vector<std::uint8_t>& measured) {
   Contour contour;
   for (int iy = 0; iy + 1 < geometry.height_cells; ++iy) {
     for (int ix = 0; ix + 1 < geometry.width_cells; ++ix) {
@@ -59,8 +60,14 @@ Contour extract_zero_level(const GridGeometry& geometry, const std::vector<float
             return Point2{x0, y0 + side * static_cast<double>(share(0, 3))};
         }
       };
+      const std::size_t corner[4] = {geometry.index(ix, iy), geometry.index(ix + 1, iy),
+                                     geometry.index(ix + 1, iy + 1), geometry.index(ix, iy + 1)};
+      const auto seen = [&](int which) {  // side k joins corners k and k + 1
+        return measured.empty() || measured[corner[which]] || measured[corner[(which + 1) % 4]];
+      };
       for (const SidePair& pair : pairs) {
-        if (pair.first >= 0) contour.push_back({crossing(pair.first), crossing(pair.second)});
+        if (pair.first >= 0 && seen(pair.first) && seen(pair.second))
+          contour.push_back({crossing(pair.first), crossing(pair.second)});
       }
     }
   }

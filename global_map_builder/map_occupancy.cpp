@@ -8,6 +8,8 @@
 namespace knav {
 namespace {
 
+constexpr double kShadow_cells = 2.0;  // between the true distance and that along the rays
+
 void mark_surface(const Contour& contour, OccupancyGrid* grid) {
   const GridGeometry& g = grid->geometry;
   for (const Point2& p : sample_contour(contour, 0.25 * g.resolution_m)) {
@@ -82,12 +84,16 @@ OccupancyGrid occupancy_from_surface(const GridGeometry& geometry, const std::ve
   OccupancyGrid occupancy;
   occupancy.geometry = geometry;
   occupancy.value.assign(value_m.size(), -1);
+  const auto tolerance = static_cast<float>(kShadow_cells * geometry.resolution_m);
   for (std::size_t i = 0; i < value_m.size(); ++i) {
     float& d = (*distance_m)[i];
     if (open[i] || hole[i]) {
       occupancy.value[i] = 0;
     } else {
-      d = std::isnan(value_m[i]) ? std::numeric_limits<float>::quiet_NaN() : -d;
+      // Behind a surface the distance along a ray is never less than the true one. Where the nearest surface is
+      // farther off, rays passed on their way into another: the shadow of an edge, of which nothing is known.
+      const bool shadow = !(d <= tolerance - value_m[i]);
+      d = shadow ? std::numeric_limits<float>::quiet_NaN() : -d;
     }
   }
   mark_surface(contour, &occupancy);

@@ -17,11 +17,18 @@ constexpr int kBand_rows = 64;
 
 std::vector<TsdfObservation> prepare(const std::vector<DriveFrame>& frames, std::size_t first,
                                      std::size_t last, const CorrectedDrive& corrected,
-                                     const ObservationLimits& limits) {
+                                     const RangeOffset& offset, const ObservationLimits& limits) {
   std::vector<TsdfObservation> out(last - first);
   tbb::parallel_for(first, last, [&](std::size_t i) {
     TsdfObservation& o = out[i - first];
-    std::visit([&](const auto& data) { observation_from(data, limits, &o); }, frames[i].data);
+    const auto* profile = std::get_if<DepthProfile>(&frames[i].data);
+    if (profile != nullptr && offset.any()) {
+      DepthProfile corrected_profile = *profile;
+      offset.apply(&corrected_profile);
+      observation_from(corrected_profile, limits, &o);
+    } else {
+      std::visit([&](const auto& data) { observation_from(data, limits, &o); }, frames[i].data);
+    }
     o.T_map_sensor = corrected.at(frames[i].stamp_s, frames[i].T_drive_base) * frames[i].T_base_sensor;
   });
   return out;
@@ -43,13 +50,14 @@ GridGeometry enclosing(const GridGeometry& a, const GridGeometry& b) {
 }
 
 void integrate(const MapBuilderConfig& config, const Drive& drive, const CorrectedDrive& corrected,
+               const RangeOffset& offset,
                const std::function<void(double)>& report, DenseTsdf* tsdf) {
   const auto& frames = drive.frames;
   const int rows = tsdf->geometry().height_cells, bands = (rows + kBand_rows - 1) / kBand_rows;
   for (std::size_t first = 0; first < frames.size(); first += kBatch) {
     report(static_cast<double>(first) / static_cast<double>(frames.size()));
     const std::size_t last = std::min(frames.size(), first + kBatch);
-    const auto batch = prepare(frames, first, last, corrected, config.surface.limits());
+    const auto batch = prepare(frames, first, last, corrected, offset, config.surface.limits());
     // Every cell belongs to one band and takes the frames in their order: the same sums on any number of
     // threads.
     tbb::parallel_for(0, bands, [&](int band) {
@@ -84,7 +92,7 @@ GridGeometry surface_extent(const MapBuilderConfig& config, const std::vector<Dr
       const std::size_t last = std::min(frames.size(), first + kBatch);
       geometry = enclosing(geometry,
                            geometry_for(config.surface.resolution_m,
-                                        prepare(frames, first, last, corrected[d], config.surface.limits())));
+                                        prepare(frames, first, last, corrected[d], {}, config.surface.limits())));
     }
   }
   const double width_m = geometry.width_cells * geometry.resolution_m;
@@ -97,25 +105,30 @@ GridGeometry surface_extent(const MapBuilderConfig& config, const std::vector<Dr
   return geometry;
 }
 
-std::vector<float> build_surface(const MapBuilderConfig& config, const std::vector<Drive>& drives,
-                                 const std::vector<CorrectedDrive>& corrected, const GridGeometry& geometry,
-                                 const std::function<void(double)>& report) {
+MapSurface build_surface(const MapBuilderConfig& config, const std::vector<Drive>& drives,
+                         const std::vector<CorrectedDrive>& corrected, const std::vector<RangeOffset>& offset,
+                         const GridGeometry& geometry, const std::function<void(double)>& report) {
   DenseTsdf whole(geometry, config.surface);
   for (std::size_t d = 0; d < drives.size(); ++d) {
     const auto part = [&](double fraction) {
       report((static_cast<double>(d) + fraction) / static_cast<double>(drives.size()));
     };
     if (d == 0) {
-      integrate(config, drives[d], corrected[d], part, &whole);
+      integrate(config, drives[d], corrected[d], offset[d], part, &whole);
       continue;
     }
     DenseTsdf newer(geometry, config.surface);
-    integrate(config, drives[d], corrected[d], part, &newer);
+    integrate(config, drives[d], corrected[d], offset[d], part, &newer);
     whole.renew(newer);
   }
-  std::vector<float> value(geometry.cell_count());
-  for (std::size_t i = 0; i < value.size(); ++i) value[i] = whole.distance_m(i);
-  return value;
+  MapSurface surface;
+  surface.value_m.resize(geometry.cell_count());
+  surface.measured.resize(geometry.cell_count());
+  for (std::size_t i = 0; i < surface.value_m.size(); ++i) {
+    surface.value_m[i] = whole.distance_m(i);
+    surface.measured[i] = whole.measured(i);
+  }
+  return surface;
 }
 
 OccupancyGrid uncorrected_map(const MapBuilderConfig& config, const std::vector<Drive>& drives,
@@ -141,7 +154,8 @@ OccupancyGrid uncorrected_map(const MapBuilderConfig& config, const std::vector<
   grid.value.assign(grid.geometry.cell_count(), -1);
   constexpr std::size_t kMaxCells = 40'000'000;  // a runaway estimate is not worth the memory
   if (grid.value.size() > kMaxCells) return {};
-  const std::vector<float> value = build_surface(coarse, thinned, rigid, grid.geometry, [](double) {});
+  const std::vector<float> value =
+      build_surface(coarse, thinned, rigid, std::vector<RangeOffset>(drives.size()), grid.geometry, [](double) {}).value_m;
   for (std::size_t i = 0; i < value.size(); ++i) {
     if (!std::isnan(value[i])) grid.value[i] = value[i] > 0.0f ? 0 : 100;
   }

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <vector>
 
 #include "core/grid_geometry.h"
 #include "global_map_builder/corrected_drive.h"
 #include "global_map_builder/map_builder_config.h"
+#include "global_map_builder/range_offset.h"
 
 namespace knav {
 
@@ -18,11 +20,17 @@ std::vector<CorrectedDrive> corrected_drives(const std::vector<Drive>& drives,
 GridGeometry surface_extent(const MapBuilderConfig& config, const std::vector<Drive>& drives,
                             const std::vector<CorrectedDrive>& corrected);
 
-/// One surface of all drives, the newer correcting the older: signed distance [m] a cell, NaN unknown.
+struct MapSurface {
+  std::vector<float> value_m;          ///< signed distance a cell, NaN unknown
+  std::vector<std::uint8_t> measured;  ///< where readings ended, see DenseTsdf
+};
+
+/// One surface of all drives, the newer correcting the older.
+/// @param offset one a drive, taken out of its depths
 /// @param report called with the fraction done; may throw to stop
-std::vector<float> build_surface(const MapBuilderConfig& config, const std::vector<Drive>& drives,
-                                 const std::vector<CorrectedDrive>& corrected, const GridGeometry& geometry,
-                                 const std::function<void(double)>& report);
+MapSurface build_surface(const MapBuilderConfig& config, const std::vector<Drive>& drives,
+                         const std::vector<CorrectedDrive>& corrected, const std::vector<RangeOffset>& offset,
+                         const GridGeometry& geometry, const std::function<void(double)>& report);
 
 /// What the map would be without closures: coarse, for a picture.
 OccupancyGrid uncorrected_map(const MapBuilderConfig& config, const std::vector<Drive>& drives,

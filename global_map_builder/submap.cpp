@@ -57,11 +57,13 @@ Submap::Submap(const SurfaceConfig& surface, const std::vector<TsdfObservation>&
   for (const TsdfObservation& o : observations) tsdf.add(o);
   std::vector<float> value(geometry_.cell_count());
   known_.resize(value.size());
+  std::vector<std::uint8_t> measured(value.size());
   for (std::size_t i = 0; i < value.size(); ++i) {
     value[i] = tsdf.distance_m(i);
+    measured[i] = tsdf.measured(i);
     known_[i] = !std::isnan(value[i]);
   }
-  Contour contour = extract_zero_level(geometry_, value);
+  Contour contour = extract_zero_level(geometry_, value, measured);
   remove_short_pieces(kMinPieceLength_m, &contour);
   signed_m_ = contour_distance_m(geometry_, contour);
   for (std::size_t i = 0; i < value.size(); ++i) {

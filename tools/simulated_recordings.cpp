@@ -41,11 +41,16 @@ std::string world_text(const std::string& path) {
   return text;
 }
 
-ProfileRecording simulate(const SimulatedDrive& drive) {
+SimulatorConfig simulator_config(const SimulatedDrive& drive) {
   SimulatorConfig config;
   config.sensor = drive.sensor;
   config.odometry = drive.odometry;
   config.seed = drive.seed;
+  return config;
+}
+
+ProfileRecording simulate(const SimulatedDrive& drive) {
+  const SimulatorConfig config = simulator_config(drive);
   Simulator simulator(load_world(drive.world_file), config);
   FrontEnd front_end(drive.front_end);
   PoseBuffer odometry;
@@ -117,6 +122,15 @@ ProfileRecording SimulatedRecordings::get(const SimulatedDrive& drive) {
   const ProfileRecording recording = simulate(drive);
   recording.save(path);
   return recording;
+}
+
+std::vector<double> SimulatedRecordings::marks_of(const SimulatedDrive& drive) {
+  Simulator simulator(load_world(drive.world_file), simulator_config(drive));
+  std::vector<double> stamps_s;
+  TourObserver observer;
+  observer.mark = [&](const std::string&) { stamps_s.push_back(simulator.stamp_s()); };
+  run_tour(simulator, load_tour(drive.tour_file), kOdometryRate_hz, drive.limit_s, observer);
+  return stamps_s;
 }
 
 }  // namespace knav

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "depth_profile_nodelet/front_end.h"
 #include "tools/profile_recording.h"
@@ -29,6 +30,8 @@ class SimulatedRecordings {
   ProfileRecording get(const SimulatedDrive& drive);
   std::string path_of(const SimulatedDrive& drive) const;
   bool have(const SimulatedDrive& drive) const;
+  /// When the button was pressed along a drive; needs no frame to be rendered.
+  static std::vector<double> marks_of(const SimulatedDrive& drive);
 
  private:
   std::string folder_;

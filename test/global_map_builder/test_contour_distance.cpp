@@ -88,6 +88,46 @@ TsdfObservation frame_of_wall(double x_m, double y_m, double yaw_rad, double wal
   return observation;
 }
 
+TEST(ContourDistance, TheEdgeOfAShadowIsNoSurface) {
+  // A camera at (2, 0.5) looks up at a wall at y = 2 that fills the right half of its view; in the left half it sees
+  // free to y = 3.5. Behind the wall's end, along the ray at its edge, free borders on what rays passed on their way
+  // into the wall.
+  const GridGeometry g{80, 84, 0.05, 0.0, 0.0};
+  SurfaceConfig config;
+  config.behind_m = 0.3;
+  DenseTsdf tsdf(g, config);
+  DepthProfile profile;
+  profile.fx_px = 100.0;
+  profile.cx_px = 49.5;
+  for (int u = 0; u < 100; ++u) {
+    profile.z_m.push_back(u < 50 ? std::numeric_limits<float>::quiet_NaN() : 1.5f);
+    profile.free_to_m.push_back(u < 50 ? 3.0f : 1.5f);
+    profile.height_class.push_back(u < 50 ? HeightClass::kNone : HeightClass::kMiddle);
+  }
+  profile.free_from_m.assign(100, 0.0f);
+  TsdfObservation observation;
+  observation_from(profile, config.limits(), &observation);
+  observation.T_map_sensor = {2.0, 0.5, kPi / 2.0};
+  for (int i = 0; i < 5; ++i) tsdf.add(observation);
+  std::vector<float> value(g.cell_count());
+  std::vector<std::uint8_t> measured(g.cell_count());
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    value[i] = tsdf.distance_m(i);
+    measured[i] = tsdf.measured(i);
+  }
+  const auto farthest_behind = [](const Contour& contour) {
+    double farthest = 0.0;
+    for (const ContourSegment& s : contour) farthest = std::max(farthest, std::max(s.a.y_m, s.b.y_m) - 2.0);
+    return farthest;
+  };
+  EXPECT_GT(farthest_behind(extract_zero_level(g, value)), 0.15) << "the case is one";
+  const Contour contour = extract_zero_level(g, value, measured);
+  EXPECT_LT(farthest_behind(contour), 0.06);
+  double length = 0.0;
+  for (const ContourSegment& s : contour) length += std::hypot(s.a.x_m - s.b.x_m, s.a.y_m - s.b.y_m);
+  EXPECT_GT(length, 0.6) << "the wall itself, 0.75 m of it, stays";
+}
+
 TEST(ContourDistance, KeepsBothSidesOfATenCentimetreWall) {
   // The wall fills 2.00 < y < 2.10; cameras at y = 0.5 and y = 3.6 face it.
   const GridGeometry g{80, 84, 0.05, 0.0, 0.0};

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "global_map_builder/drive.h"
+#include "global_map_builder/range_offset.h"
+
+namespace knav {
+
+/// A piece of surface that one frame saw.
+struct ViewPoint {
+  double column_share = 0.0;  ///< where across the image, 0 ... 1
+  double depth_m = 0.0;       ///< as read: along the axis of a depth camera, along the ray of a scanner
+  Eigen::Vector2d direction;  ///< times depth_m: the point in the sensor's frame
+  bool valid = false;         ///< the point ...
+  bool straight = false;      ///< ... and the surface round it, which has a normal
+  // In the keyframe's frame:
+  Eigen::Vector2d position, normal;
+  Eigen::Vector2d on_line;  ///< the point as the straight surface round it has it, less noisy
+  Eigen::Vector2d per_offset;  ///< how the position changes with the offset of its column
+  double sd_m = 0.0;           ///< along the normal
+  double range_m = 0.0;
+};
+
+/// The frame at a keyframe as points of surfaces, a bin of neighbouring columns each.
+class DriveView {
+ public:
+  /// `keyframe` of `drive`; empty if no frame was kept near it.
+  DriveView(const Drive& drive, int keyframe);
+
+  bool empty() const { return points_.empty(); }
+  bool depth_camera() const { return pinhole_; }
+  /// The sensor, in the keyframe's frame.
+  Eigen::Vector2d eye() const { return {T_keyframe_sensor_.x_m, T_keyframe_sensor_.y_m}; }
+  const std::vector<ViewPoint>& points() const { return points_; }
+  /// Points and normals with this offset taken out.
+  void place(const RangeOffset& offset);
+  /// The bin that looks at a point of the keyframe's frame, -1 if none does.
+  int bin_of(const Eigen::Vector2d& point) const;
+
+ private:
+  void fill(const DepthProfile& profile);
+  void fill(const RangeScan& scan);
+  void find_normals();
+
+  Pose2 T_keyframe_sensor_;
+  bool pinhole_ = true;
+  double fx_px_ = 1.0, cx_px_ = 0.0, angle_min_rad_ = 0.0, angle_increment_rad_ = 1.0;
+  double bin_columns_ = 1.0;
+  std::vector<ViewPoint> points_;
+};
+
+}  // namespace knav

@@ -1,0 +1,136 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "flat_drive.h"
+#include "global_map_builder/joint_refiner.h"
+
+namespace knav {
+namespace {
+
+using namespace flat_world;
+
+constexpr double kStep_s = 0.1;
+
+/// A drive on true poses, a keyframe every half metre or 30 degrees, seen by a camera that is wrong by an offset.
+Drive drive_of(const std::vector<Wall>& walls, const std::vector<Pose2>& truth, const RangeOffset& wrong) {
+  Drive drive;
+  double path_m = 0.0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const double stamp_s = kStart_s + kStep_s * static_cast<double>(i);
+    if (i > 0) path_m += distance_m(truth[i - 1], truth[i]);
+    const Pose2* last = drive.keyframes.empty() ? nullptr : &drive.keyframes.back().T_drive_base;
+    if (last != nullptr && distance_m(*last, truth[i]) < 0.5 &&
+        std::fabs(normalize_angle_rad(last->yaw_rad - truth[i].yaw_rad)) < 0.5) {
+      continue;
+    }
+    RandomStream random(7, random_stream::kTest, i, 0);
+    DepthProfile profile = profile_at(walls, truth[i] * kMount, stamp_s, random);
+    // What the camera reads if `wrong` sets it right.
+    RangeOffset inverse;
+    for (std::size_t k = 0; k < inverse.knot_per_m.size(); ++k) inverse.knot_per_m[k] = -wrong.knot_per_m[k];
+    inverse.apply(&profile);
+    drive.frames.push_back({stamp_s, path_m, truth[i], truth[i], kMount, profile});
+    drive.keyframes.push_back({stamp_s, path_m, truth[i], truth[i], false, false});
+  }
+  return drive;
+}
+
+/// The graph that a mapper leaves which takes every metre for 1 % more and turns by a little: sd as the builder's.
+PoseGraph bent_graph(const Drive& drive) {
+  PoseGraph graph;
+  const Eigen::Vector3d sd(0.02, 0.02, 0.006);
+  Pose2 at;
+  for (std::size_t i = 0; i < drive.keyframes.size(); ++i) {
+    if (i > 0) {
+      Pose2 step = drive.keyframes[i - 1].T_drive_base.inverse() * drive.keyframes[i].T_drive_base;
+      step.x_m *= 1.01;
+      step.yaw_rad += 0.001;
+      at = at * step;
+      const int node = static_cast<int>(i);
+      graph.edges.push_back({node - 1, node, step, sd.cwiseAbs2().cwiseInverse().asDiagonal(), false});
+    }
+    graph.nodes[static_cast<int>(i)] = at;
+  }
+  return graph;
+}
+
+double worst_error_m(const Drive& drive, const std::vector<Pose2>& poses) {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    worst = std::max(worst, distance_m(poses[i], drive.keyframes[i].T_drive_base));
+  return worst;
+}
+
+std::vector<Pose2> poses_of(const PoseGraph& graph) {
+  std::vector<Pose2> poses;
+  for (const auto& [id, pose] : graph.nodes) poses.push_back(pose);
+  return poses;
+}
+
+TEST(JointRefiner, StraightensADriveThatTheGraphLeftBent) {
+  const Drive drive = drive_of(ring(), drive_through({{0, 0}, {11, 0}, {11, 7}, {0, 7}, {0, 0}, {6, 0}}), {});
+  const PoseGraph graph = bent_graph(drive);
+  const double before_m = worst_error_m(drive, poses_of(graph));
+  ASSERT_GT(before_m, 0.3);
+  JointRefinementConfig config;
+  config.point_weight = 0.1;
+  const JointRefinement refined = refine_jointly(config, {drive}, graph, 3.0, [](double) {});
+  EXPECT_TRUE(refined.kept);
+  EXPECT_GT(refined.pairs, 50u);
+  EXPECT_LT(refined.misfit_after, refined.misfit_before);
+  EXPECT_LT(worst_error_m(drive, refined.T_map_keyframe), 0.35 * before_m);
+  EXPECT_EQ(distance_m(refined.T_map_keyframe[0], Pose2{}), 0.0) << "the start stays";
+}
+
+TEST(JointRefiner, FindsWhatTheCameraIsSteadilyWrongBy) {
+  RangeOffset wrong;  // the sides read long, the middle short
+  wrong.knot_per_m = {0.003, 0.001, -0.001, -0.002, -0.002, -0.002, -0.001, 0.001, 0.003};
+  const Drive drive = drive_of(ring(), drive_through({{0, 0}, {11, 0}, {11, 7}, {0, 7}, {0, 0}}), wrong);
+  PoseGraph graph = bent_graph(drive);
+  for (std::size_t i = 0; i < drive.keyframes.size(); ++i)
+    graph.nodes[static_cast<int>(i)] = drive.keyframes[i].T_drive_base;
+  for (PoseGraphEdge& edge : graph.edges) {
+    edge.T_from_to = drive.keyframes[static_cast<std::size_t>(edge.from)].T_drive_base.inverse() *
+                     drive.keyframes[static_cast<std::size_t>(edge.to)].T_drive_base;
+  }
+  JointRefinementConfig config;
+  config.point_weight = 0.1;
+  config.offset_sd_per_m = 0.005;
+  const JointRefinement refined = refine_jointly(config, {drive}, graph, 3.0, [](double) {});
+  ASSERT_TRUE(refined.kept);
+  double before = 0.0, after = 0.0;
+  for (std::size_t k = 0; k < wrong.knot_per_m.size(); ++k) {
+    before += std::pow(wrong.knot_per_m[k], 2);
+    after += std::pow(wrong.knot_per_m[k] - refined.offset[0].knot_per_m[k], 2);
+  }
+  EXPECT_LT(std::sqrt(after), 0.5 * std::sqrt(before));
+}
+
+TEST(JointRefiner, HeldKeyframesStayToTheBit) {
+  const Drive drive = drive_of(ring(), drive_through({{0, 0}, {8, 0}}), {});
+  PoseGraph graph = bent_graph(drive);
+  for (int node = 0; node < 6; ++node) graph.held.insert(node);
+  const JointRefinement refined = refine_jointly({}, {drive}, graph, 3.0, [](double) {});
+  for (int node = 0; node < 6; ++node) {
+    EXPECT_EQ(refined.T_map_keyframe[static_cast<std::size_t>(node)].x_m, graph.nodes.at(node).x_m);
+    EXPECT_EQ(refined.T_map_keyframe[static_cast<std::size_t>(node)].yaw_rad, graph.nodes.at(node).yaw_rad);
+  }
+}
+
+TEST(JointRefiner, NothingInCommonLeavesTheGraphAlone) {
+  Drive drive = drive_of(ring(), drive_through({{0, 0}, {8, 0}}), {});
+  for (DriveFrame& frame : drive.frames) {
+    auto& profile = std::get<DepthProfile>(frame.data);
+    profile.z_m.assign(profile.z_m.size(), std::numeric_limits<float>::quiet_NaN());
+  }
+  const PoseGraph graph = bent_graph(drive);
+  const JointRefinement refined = refine_jointly({}, {drive}, graph, 3.0, [](double) {});
+  EXPECT_EQ(refined.pairs, 0u);
+  const std::vector<Pose2> before = poses_of(graph);
+  for (std::size_t i = 0; i < before.size(); ++i)
+    EXPECT_LT(distance_m(refined.T_map_keyframe[i], before[i]), 1e-6);
+}
+
+}  // namespace
+}  // namespace knav
