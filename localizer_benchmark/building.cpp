@@ -1,0 +1,147 @@
+#include "localizer_benchmark/building.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "brin_benchmark/floor_plan.h"
+#include "brin_benchmark/layout.h"
+#include "core/error.h"
+#include "core/file_io.h"
+#include "localizer_benchmark/image_world.h"
+
+namespace fs = std::filesystem;
+
+namespace knav {
+namespace {
+
+constexpr double kRobotRadius_m = 0.20;
+constexpr int kPeople = 10;
+constexpr int kPlaces = 14;
+/// Drawn for every piece; about 30 % then find room where they are to go.
+constexpr double kMovedShare = 0.45;
+constexpr int kCalmRun = 3, kOtherCalmRun = 7;  // of lay_out's runs: no crowd, six people each
+
+Point2 position(const Pose2& pose) { return {pose.x_m, pose.y_m}; }
+
+std::map<std::string, Pose2> places_of(const FloorPlan& plan, const WorldConfig& world) {
+  return world.places.empty() ? choose_places(plan, world, kPlaces) : world.places;
+}
+
+std::string point_text(const Point2& p) { return fmt::format("[{:.2f}, {:.2f}]", p.x_m, p.y_m); }
+
+/// Furniture moved, doors that are closed for good, and people; what the benchmark of the whole robot adds beside is left out.
+YAML::Node changes_of(const WorldConfig& world, int seed, std::string* words) {
+  const FloorPlan plan(world, kRobotRadius_m);
+  const auto places = places_of(plan, world);
+  std::vector<std::vector<Point2>> legs;
+  Point2 at = position(world.spawn);
+  for (const auto& [name, pose] : places) {
+    std::vector<Point2> way = plan.path(at, position(pose));
+    if (way.size() < 2) continue;
+    legs.push_back(std::move(way));
+    at = position(pose);
+  }
+  LayoutConfig config;
+  config.seed = seed;
+  config.moved_share = kMovedShare;
+  const auto run = [&](int k) { return YAML::Load("runs:\n" + make_run(plan, world, places, legs, config, k))["runs"][0]; };
+  const YAML::Node calm = run(kCalmRun);
+  YAML::Node changes;
+  std::size_t moved = 0, closed = 0;
+  if (calm["moved"]) {
+    changes["moved"] = calm["moved"];
+    moved = calm["moved"].size();
+  }
+  for (const YAML::Node& door : calm["door_states"]) {
+    if (!door["open_deg"]) continue;  // a door that is the only way closes for half a minute only
+    changes["door_states"].push_back(door);
+    ++closed;
+  }
+  for (const int k : {kCalmRun, kOtherCalmRun}) {
+    const YAML::Node people = run(k)["people"];
+    for (std::size_t i = 0; i < people.size() && changes["people"].size() < kPeople; ++i) {
+      YAML::Node person = people[i];
+      person["name"] = fmt::format("person {}", changes["people"].size() + 1);
+      changes["people"].push_back(person);
+    }
+  }
+  *words = fmt::format("{} of {} pieces of furniture moved ({:.0f} %), {} of {} doors closed, {} people", moved,
+                       world.pieces.size(), 100.0 * static_cast<double>(moved) / static_cast<double>(std::max<std::size_t>(1, world.pieces.size())),
+                       closed, world.doors.size(), changes["people"].size());
+  return changes;
+}
+
+}  // namespace
+
+BuildingSource parse_building(const std::string& text) {
+  BuildingSource source;
+  const auto equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw UserError(fmt::format("--building '{}': must be NAME=WORLD.yaml or NAME=IMAGE@RESOLUTION.", text));
+  }
+  source.name = text.substr(0, equals);
+  source.file = text.substr(equals + 1);
+  const auto at = source.file.rfind('@');
+  if (at != std::string::npos) {
+    try {
+      source.resolution_m = std::stod(source.file.substr(at + 1));
+    } catch (const std::exception&) {
+    }
+    if (!(source.resolution_m > 0.0)) {
+      throw UserError(fmt::format("--building '{}': what follows the @ must be metres a pixel.", text));
+    }
+    source.file.resize(at);
+  }
+  if (!fs::exists(source.file)) throw UserError(fmt::format("--building '{}': there is no {}.", text, source.file));
+  return source;
+}
+
+Building prepare_building(const BuildingSource& source, const std::string& folder, int seed) {
+  fs::create_directories(folder);
+  Building building;
+  building.name = source.name;
+  building.world_file = source.file;
+  building.tour_file = source.tour_file;
+  if (source.resolution_m > 0.0) {
+    building.world_file = fmt::format("{}/{}.yaml", folder, source.name);
+    write_image_world(source.file, source.resolution_m, building.world_file, seed);
+  }
+  const WorldConfig world = load_world(building.world_file);
+  const YAML::Node changes = changes_of(world, seed, &building.changes);
+  building.changed_file = fmt::format("{}/{}_changed.yaml", folder, source.name);
+  write_text_atomically(building.changed_file, fmt::format("base: {}\n", fs::absolute(building.world_file).string()) + YAML::Dump(changes) + "\n");
+  return building;
+}
+
+std::string lay_out_drive(const WorldConfig& world, double length, int seed) {
+  const FloorPlan plan(world, kRobotRadius_m);
+  std::vector<Point2> stops;
+  for (const auto& [name, pose] : choose_places(plan, world, kPlaces)) stops.push_back(position(pose));
+  std::string text = "speed_mps: 0.6\nturn_radps: 0.8\nsteps:\n  - wait: 1.0\n";
+  Point2 at = position(world.spawn);
+  double driven_m = 0.0;
+  for (std::uint64_t round = 0; driven_m < length; ++round) {
+    if (round > 1000) throw UserError(world.file + ": its places cannot be reached.");
+    RandomStream random(static_cast<std::uint64_t>(seed), random_stream::kChanges, round, 2);
+    for (std::size_t i = stops.size(); i > 1; --i) {
+      std::swap(stops[i - 1], stops[std::min(i - 1, static_cast<std::size_t>(random.uniform() * static_cast<double>(i)))]);
+    }
+    for (const Point2& stop : stops) {
+      const std::vector<Point2> way = plan.path(at, stop);
+      if (way.size() < 2 || length_m(way) < 2.0) continue;
+      text += "  - drive: [";
+      for (std::size_t i = 1; i < way.size(); ++i) text += (i > 1 ? ", " : "") + point_text(way[i]);
+      text += "]\n  - turn: 360\n";
+      driven_m += length_m(way);
+      at = stop;
+      if (driven_m >= length) break;
+    }
+  }
+  return text + "  - wait: 1.0\n";
+}
+
+}  // namespace knav
