@@ -24,6 +24,7 @@ struct Building {
   std::string world_file;    ///< what the map shows
   std::string changed_file;  ///< a share of the furniture moved, doors closed, ten people
   std::string tour_file;     ///< empty: laid out per drive
+  std::size_t solids = 0;    ///< prisms it is made of
   std::string changes;       ///< what was changed, in words
 };
 

@@ -18,33 +18,46 @@ namespace fs = std::filesystem;
 namespace knav {
 namespace {
 
-constexpr int kWallBelow = 100, kFreeFrom = 240;  // grey values
+constexpr int kFreeFrom = 240;  // grey value
+constexpr double kStreak_m = 0.12;  // half of the width of what is no floor
 constexpr double kRoom_m = 0.45;                  // clear of walls: where the robot may start
 constexpr double kAreaPerPiece_m2 = 15.0;
 constexpr double kRobotRadius_m = 0.20;
 constexpr double kFurnitureReach_m = 0.75;  // from its middle to its farthest corner
 
-/// Walls where they are drawn, and where free space would end in the unknown.
-cv::Mat closed_walls(const cv::Mat& grey) {
-  cv::Mat wall = grey < kWallBelow, free = grey >= kFreeFrom, near_free;
-  cv::dilate(free, near_free, cv::Mat::ones(3, 3, CV_8U));
-  wall |= near_free & (grey < kFreeFrom);
-  return wall;
+cv::Mat disc(double radius_px) {
+  const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
+  return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * r + 1, 2 * r + 1});
+}
+
+/// Without the streaks that a laser drew through windows, and without specks of a pixel.
+cv::Mat open_space(const cv::Mat& grey, double resolution_m) {
+  cv::Mat free = grey >= kFreeFrom;
+  cv::morphologyEx(free, free, cv::MORPH_OPEN, disc(kStreak_m / resolution_m));
+  cv::Mat not_free, labels, stats, centroids;
+  cv::bitwise_not(free, not_free);
+  const int count = cv::connectedComponentsWithStats(not_free, labels, stats, centroids, 8);
+  for (int y = 0; y < labels.rows; ++y) {
+    for (int x = 0; x < labels.cols; ++x) {
+      const int k = labels.at<int>(y, x);
+      if (k > 0 && k < count && stats.at<int>(k, cv::CC_STAT_AREA) < 2) free.at<std::uint8_t>(y, x) = 255;
+    }
+  }
+  return free;
 }
 
 /// The middle of the largest open area that does not reach the image's rim.
-cv::Point find_start(const cv::Mat& wall, const cv::Mat& grey, double resolution_m, const std::string& file) {
-  cv::Mat distance, open, labels, stats, centroids;
-  cv::Mat no_wall;
-  cv::bitwise_not(wall, no_wall);
-  cv::distanceTransform(no_wall, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
-  open = (distance > kRoom_m / resolution_m) & (grey >= kFreeFrom);
-  const int count = cv::connectedComponentsWithStats(open, labels, stats, centroids, 4);
+cv::Point find_start(const cv::Mat& free, double resolution_m, const std::string& file) {
+  cv::Mat distance, room, labels, stats, centroids;
+  cv::distanceTransform(free, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  room = distance > kRoom_m / resolution_m;
+  const int count = cv::connectedComponentsWithStats(room, labels, stats, centroids, 4);
   int best = 0, best_area = 0;
   for (int k = 1; k < count; ++k) {
     const int x = stats.at<int>(k, cv::CC_STAT_LEFT), y = stats.at<int>(k, cv::CC_STAT_TOP);
-    const bool rim = x <= 1 || y <= 1 || x + stats.at<int>(k, cv::CC_STAT_WIDTH) >= wall.cols - 1 ||
-                     y + stats.at<int>(k, cv::CC_STAT_HEIGHT) >= wall.rows - 1;
+    const double rim_px = kRoom_m / resolution_m + 2.0;
+    const bool rim = x <= rim_px || y <= rim_px || x + stats.at<int>(k, cv::CC_STAT_WIDTH) >= free.cols - rim_px ||
+                     y + stats.at<int>(k, cv::CC_STAT_HEIGHT) >= free.rows - rim_px;
     if (rim || stats.at<int>(k, cv::CC_STAT_AREA) <= best_area) continue;
     best = k;
     best_area = stats.at<int>(k, cv::CC_STAT_AREA);
@@ -55,7 +68,7 @@ cv::Point find_start(const cv::Mat& wall, const cv::Mat& grey, double resolution
   double nearest = 1e18;
   for (int y = 0; y < labels.rows; ++y) {
     for (int x = 0; x < labels.cols; ++x) {
-      if (labels.at<int>(y, x) != best || distance.at<float>(y, x) < 1.0 / resolution_m * 0.6) continue;
+      if (labels.at<int>(y, x) != best || distance.at<float>(y, x) < 0.6 / resolution_m) continue;
       const double d = std::hypot(x - middle.x, y - middle.y);
       if (d < nearest) {
         nearest = d;
@@ -67,12 +80,22 @@ cv::Point find_start(const cv::Mat& wall, const cv::Mat& grey, double resolution
   return start;
 }
 
+/// What bounds the space that the start belongs to; nothing else can be seen.
+cv::Mat walls_about(const cv::Mat& free, const cv::Point& start) {
+  cv::Mat labels, wall;
+  cv::connectedComponents(free, labels, 4);
+  const cv::Mat inside = labels == labels.at<int>(start);
+  cv::dilate(inside, wall, cv::Mat::ones(3, 3, CV_8U));
+  wall &= ~inside;
+  return wall;
+}
+
 /// Every other piece stands free, the rest beside walls, wherever the robot can still reach all it could before.
 std::string furniture(const WorldConfig& world, int seed) {
   const FloorPlan plan(world, kRobotRadius_m);
   const std::vector<Point2> open = plan.reachable(0.35);
   std::vector<Point2> must_reach;
-  for (std::size_t i = 0; i < open.size(); i += std::max<std::size_t>(1, open.size() / 200)) must_reach.push_back(open[i]);
+  for (std::size_t i = 0; i < open.size(); i += std::max<std::size_t>(1, open.size() / 40)) must_reach.push_back(open[i]);
   const auto wanted = static_cast<int>(static_cast<double>(open.size()) * 0.04 / kAreaPerPiece_m2);  // points 0.2 m apart
   RandomStream random(static_cast<std::uint64_t>(seed), random_stream::kChanges, 0, 3);
   std::vector<Solid> stands;
@@ -117,8 +140,9 @@ std::string furniture(const WorldConfig& world, int seed) {
 void write_image_world(const std::string& image_file, double resolution_m, const std::string& world_file, int seed) {
   const cv::Mat grey = cv::imread(image_file, cv::IMREAD_GRAYSCALE);
   if (grey.empty()) throw UserError(image_file + ": cannot be read as an image.");
-  const cv::Mat wall = closed_walls(grey);
-  const cv::Point start = find_start(wall, grey, resolution_m, image_file);
+  const cv::Mat free = open_space(grey, resolution_m);
+  const cv::Point start = find_start(free, resolution_m, image_file);
+  const cv::Mat wall = walls_about(free, start);
   const std::string closed_file = fs::path(world_file).replace_extension(".png").string();
   cv::Mat picture;
   cv::bitwise_not(wall, picture);

@@ -104,6 +104,7 @@ void benchmark(Options options) {
   nlohmann::json json = nlohmann::json::array();
   for (const std::string& row : options.rows) {
     for (std::size_t b = 0; b < sources.size(); ++b) {
+      if (row == "changed") fmt::print(stderr, "{} ({} prisms), changed: {}.\n", sources[b].name, rows.building(b).solids, rows.building(b).changes);
       if (options.record_only) {
         rows.record(row, b);
         continue;

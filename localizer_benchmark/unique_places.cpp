@@ -16,14 +16,10 @@ constexpr double kHalfView_rad = 0.5 * 57.0 * kPi / 180.0, kView_m = 8.0;
 constexpr double kElsewhere_m = 0.75, kElsewhere_rad = 0.4;
 constexpr std::size_t kRaysApart = 20;  // of the perfect scan's 3,600: 2 deg
 
-CostField within(const DistanceMap& map, double distance_m) {
-  CostField field(map.geometry, 1.0);
-  for (int iy = 0; iy < map.geometry.height_cells; ++iy) {
-    for (int ix = 0; ix < map.geometry.width_cells; ++ix) {
-      field.set(ix, iy, std::fabs(map.at(ix, iy)) <= distance_m ? 0.0 : 1.0);  // 1 for NaN
-    }
-  }
-  return field;
+PriceField within(const DistanceMap& map, double distance_m) {
+  std::vector<std::uint8_t> prices;
+  for (const float d : map.distance_m) prices.push_back(std::fabs(d) <= distance_m ? 0 : 255);  // 255 for NaN
+  return {map.geometry, prices, 255};
 }
 
 WeightedPoints thinned(const std::vector<Point2>& view) {
@@ -76,7 +72,7 @@ double UniquePlaces::fit(const std::vector<Point2>& view, const Pose2& T_map_vie
   one.resize(1);
   one.set(0, T_map_view);
   std::vector<float> miss;
-  alignment_costs(nearer_, thinned(view), one, false, &miss);
+  mean_prices(nearer_, thinned(view), one, &miss);
   return 1.0 - miss[0];
 }
 
@@ -95,7 +91,7 @@ double UniquePlaces::refined_fit(const WeightedPoints& points, Pose2* pose) cons
           }
         }
       }
-      alignment_costs(nearer_, points, around, false, &miss);
+      mean_prices(nearer_, points, around, &miss);
       const auto winner = std::min_element(miss.begin(), miss.end()) - miss.begin();
       best = miss[static_cast<std::size_t>(winner)];
       if (winner == 0) break;
@@ -117,7 +113,7 @@ bool UniquePlaces::unique(const std::vector<Point2>& view, const Pose2& T_map_vi
   std::vector<Candidate> candidates;
   for (const Point2& p : positions_) {
     for (int h = 0; h < kHeadings; ++h) poses.set(static_cast<std::size_t>(h), {p.x_m, p.y_m, normalize_angle_rad(2.0 * kPi * h / kHeadings)});
-    alignment_costs(near_, points, poses, false, &miss);
+    mean_prices(near_, points, poses, &miss);
     for (int h = 0; h < kHeadings; ++h) {
       const auto k = static_cast<std::size_t>(h);
       if (1.0 - miss[k] >= kCoarseShare && elsewhere(poses.pose(k), T_map_view)) candidates.push_back({miss[k], poses.pose(k)});

@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "core/cost_field.h"
 #include "core/distance_map.h"
 #include "localizer_benchmark/scan_recording.h"
+#include "tsdf_localizer/price_field.h"
 
 namespace knav {
 
@@ -27,7 +27,7 @@ class UniquePlaces {
  private:
   double refined_fit(const WeightedPoints& points, Pose2* pose) const;
 
-  CostField near_, nearer_;  ///< 0 within some distance of a surface, 1 elsewhere
+  PriceField near_, nearer_;  ///< 0 within some distance of a surface, 1 elsewhere
   std::vector<Point2> positions_;
 };
 

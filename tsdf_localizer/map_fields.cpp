@@ -15,32 +15,31 @@ double price(float distance_m, double truncation_m, double unknown_cost) {
   return std::isfinite(distance_m) ? std::min(1.0, std::fabs(distance_m) / truncation_m) : unknown_cost;
 }
 
-CostField fine_field(const DistanceMap& map, const MeasurementConfig& config) {
-  CostField field(map.geometry, config.unknown_cost);
-  for (int iy = 0; iy < map.geometry.height_cells; ++iy) {
-    for (int ix = 0; ix < map.geometry.width_cells; ++ix) {
-      field.set(ix, iy, price(map.at(ix, iy), config.truncation_m, config.unknown_cost));
-    }
+PriceField fine_field(const DistanceMap& map, const MeasurementConfig& config) {
+  std::vector<std::uint8_t> prices(map.distance_m.size());
+  const auto to_price = static_cast<float>(255.0 / config.truncation_m);
+  const std::uint8_t unknown = quantized_price(config.unknown_cost);
+  for (std::size_t i = 0; i < prices.size(); ++i) {
+    const float price = std::fabs(map.distance_m[i]) * to_price;  // NaN where unknown
+    prices[i] = price >= 0.0f ? static_cast<std::uint8_t>(std::min(255.0f, price + 0.5f)) : unknown;
   }
-  return field;
+  return {map.geometry, prices, unknown};
 }
 
-CostField coarse_field(const DistanceMap& map, double truncation_m, double unknown_cost) {
+PriceField coarse_field(const DistanceMap& map, double truncation_m, double unknown_cost) {
   const GridGeometry& fine = map.geometry;
   const int factor = std::max(1, static_cast<int>(std::lround(kCoarseCell_m / fine.resolution_m)));
   GridGeometry coarse = fine;
   coarse.resolution_m = fine.resolution_m * factor;
   coarse.width_cells = (fine.width_cells + factor - 1) / factor;
   coarse.height_cells = (fine.height_cells + factor - 1) / factor;
-  CostField field(coarse, unknown_cost);
+  std::vector<std::uint8_t> prices(coarse.cell_count());
   for (int iy = 0; iy < coarse.height_cells; ++iy) {
     for (int ix = 0; ix < coarse.width_cells; ++ix) {
-      field.set(
-          ix, iy,
-          price(map.at(ix * factor + factor / 2, iy * factor + factor / 2), truncation_m, unknown_cost));
+      prices[coarse.index(ix, iy)] = quantized_price(price(map.at(ix * factor + factor / 2, iy * factor + factor / 2), truncation_m, unknown_cost));
     }
   }
-  return field;
+  return {coarse, prices, quantized_price(unknown_cost)};
 }
 
 std::vector<Point2> free_positions(const DistanceMap& map, const GlobalSearchConfig& config) {

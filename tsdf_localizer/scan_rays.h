@@ -3,10 +3,10 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/cost_field.h"
 #include "core/pose2.h"
 #include "core/range_scan.h"
 #include "tsdf_localizer/localizer_config.h"
+#include "tsdf_localizer/price_field.h"
 
 namespace knav {
 

@@ -12,7 +12,8 @@ namespace {
 
 const Pose2 kPose{10.5, 5.0, 2.0};
 
-void BM_AlignmentCosts(benchmark::State& state) {
+void mean_prices_of(benchmark::State& state, PriceCode code) {
+  if (!has(code)) return state.SkipWithError("this processor cannot");
   const test::Building office = test::office();
   const MapFields fields = make_map_fields(office.distance_map(), {}, {});
   LocalizerConfig config;
@@ -23,12 +24,14 @@ void BM_AlignmentCosts(benchmark::State& state) {
   Belief belief(config);
   belief.spread_around(kPose, Eigen::Vector3d(0.01, 0.01, 0.003).asDiagonal());
   std::vector<float> cost;
-  for (auto _ : state) alignment_costs(fields.fine, rays.points, belief.particles(), true, &cost);
+  for (auto _ : state) mean_prices(fields.fine, rays.points, belief.particles(), &cost, code);
   state.counters["ns_per_reading"] =
       benchmark::Counter(static_cast<double>(state.range(0) * state.range(1)) * 1e-9,
                          benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
-BENCHMARK(BM_AlignmentCosts)->Args({300, 720})->Args({2000, 3600})->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(mean_prices_of, best, PriceCode::kBest)->Args({300, 720})->Args({2000, 3600})->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(mean_prices_of, avx2, PriceCode::kAvx2)->Args({2000, 3600})->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(mean_prices_of, plain, PriceCode::kPlain)->Args({2000, 3600})->Unit(benchmark::kMillisecond);
 
 void BM_CheckPose(benchmark::State& state) {
   const test::Building office = test::office();
