@@ -13,6 +13,7 @@ struct MeasurementConfig {
   double unknown_cost = 0.5;
   double temperature = 0.006;
   double evidence_min = 0.02;
+  double evidence_power = 1.0;
   double noise_m = 0.05;
   double noise_per_range_squared = 0.002;
   double fresh_after_m = 0.3;
@@ -29,6 +30,8 @@ struct MeasurementConfig {
              "Rise of the mean price that makes a pose e times less likely, for a scan of all new evidence.");
     v.number("evidence_min", evidence_min, 0, 1, "",
              "Rays with less evidence (intensities of scan_360) are left out.");
+    v.number("evidence_power", evidence_power, 0, 10, "",
+             "A ray weighs its evidence to this power: what is old has moved with the local map's drift.");
     v.number("noise_m", noise_m, 0.005, 1, "m",
              "Noise (sd) of a near reading; sets the weight of far ones beside it.");
     v.number("noise_per_range_squared", noise_per_range_squared, 0, 0.1, "1/m",

@@ -62,6 +62,24 @@ std::vector<Point2> free_positions(const DistanceMap& map, const GlobalSearchCon
 
 }  // namespace
 
+bool shows_the_same(const DistanceMap& map, const OccupancyGrid& occupancy) {
+  constexpr std::int8_t kOccupied = 65;   // map_server's threshold
+  constexpr double kAgreeing = 0.95;
+  const GridGeometry &a = map.geometry, &b = occupancy.geometry;
+  const double tolerance_m = 0.01 * a.resolution_m;
+  if (a.width_cells != b.width_cells || a.height_cells != b.height_cells || occupancy.value.size() != map.distance_m.size() ||
+      !(std::fabs(a.resolution_m - b.resolution_m) < 1e-6) || !(std::fabs(a.origin_x_m - b.origin_x_m) < tolerance_m) ||
+      !(std::fabs(a.origin_y_m - b.origin_y_m) < tolerance_m))
+    return false;
+  std::size_t walls = 0, agreeing = 0;
+  for (std::size_t i = 0; i < occupancy.value.size(); ++i) {
+    if (occupancy.value[i] < kOccupied) continue;
+    ++walls;
+    agreeing += map.distance_m[i] < 1.5 * a.resolution_m;  // negative behind a surface; false for NaN
+  }
+  return static_cast<double>(agreeing) >= kAgreeing * static_cast<double>(walls);
+}
+
 MapFields make_map_fields(const DistanceMap& map, const MeasurementConfig& measurement,
                           const GlobalSearchConfig& search) {
   const GridGeometry& grid = map.geometry;

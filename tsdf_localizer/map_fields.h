@@ -19,6 +19,9 @@ struct MapFields {
   std::vector<Point2> search_positions;  ///< free places on the search's grid
 };
 
+/// True if an occupancy grid may be that of a distance map: the same cells, and nearly all walls where the distances are small.
+bool shows_the_same(const DistanceMap& map, const OccupancyGrid& occupancy);
+
 /// UserError if the map is empty, or its size and data disagree.
 MapFields make_map_fields(const DistanceMap& map, const MeasurementConfig& measurement,
                           const GlobalSearchConfig& search);
