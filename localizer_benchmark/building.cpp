@@ -20,9 +20,11 @@ namespace {
 
 constexpr double kRobotRadius_m = 0.20;
 constexpr int kPeople = 10;
+/// The driver of a tour does not dodge: people walk where they can.
+constexpr double kRoomToPass_m = 1.2;
 constexpr int kPlaces = 14;
 constexpr double kMovedShare = 0.3;
-constexpr int kCalmRun = 3, kOtherCalmRun = 7;  // of lay_out's runs: no crowd, six people each
+constexpr int kCalmRun = 3;  // of lay_out's runs this and every sixth from it have no crowd
 
 Point2 position(const Pose2& pose) { return {pose.x_m, pose.y_m}; }
 
@@ -52,7 +54,8 @@ bool is_furniture(const WorldConfig& world, const WorldPiece& piece) {
 }
 
 /// A share of the furniture to other places near by, wherever the building stays passable.
-YAML::Node move_furniture(const FloorPlan& plan, const WorldConfig& world, const std::vector<Point2>& must_reach, int seed, std::string* words) {
+YAML::Node move_furniture(const FloorPlan& plan, const WorldConfig& world, const std::vector<Point2>& must_reach, int seed,
+                          std::vector<Solid>* moved_to, std::string* words) {
   RandomStream random(static_cast<std::uint64_t>(seed), random_stream::kChanges, 0, 5);
   std::vector<WorldPiece> pieces;
   for (const WorldPiece& piece : world.pieces) {
@@ -64,7 +67,7 @@ YAML::Node move_furniture(const FloorPlan& plan, const WorldConfig& world, const
   }
   const auto wanted = static_cast<std::size_t>(std::lround(kMovedShare * static_cast<double>(all)));
   YAML::Node moved;
-  std::vector<Solid> stands;
+  std::vector<Solid>& stands = *moved_to;
   std::vector<std::pair<Point2, double>> taken;
   for (const WorldPiece& piece : pieces) {
     if (moved.size() >= wanted) break;
@@ -111,7 +114,8 @@ YAML::Node changes_of(const WorldConfig& world, int seed, std::string* words) {
   std::vector<Point2> must_reach{position(world.spawn)};
   for (const auto& [name, pose] : places) must_reach.push_back(position(pose));
   std::string furniture;
-  const YAML::Node moved = move_furniture(plan, world, must_reach, seed, &furniture);
+  std::vector<Solid> stands;
+  const YAML::Node moved = move_furniture(plan, world, must_reach, seed, &stands, &furniture);
   if (moved.size() > 0) changes["moved"] = moved;
   std::size_t closed = 0;
   for (const YAML::Node& door : calm["door_states"]) {
@@ -119,10 +123,20 @@ YAML::Node changes_of(const WorldConfig& world, int seed, std::string* words) {
     changes["door_states"].push_back(door);
     ++closed;
   }
-  for (const int k : {kCalmRun, kOtherCalmRun}) {
+  const auto in_the_way = [&](const YAML::Node& person) {
+    for (const YAML::Node& waypoint : person["path"]) {
+      const YAML::Node at = waypoint.IsMap() ? waypoint["at"] : waypoint;
+      const Point2 p{at[0].as<double>(), at[1].as<double>()};
+      if (plan.clearance_m(p) < kRoomToPass_m) return true;
+      if (std::any_of(stands.begin(), stands.end(), [&](const Solid& s) { return footprint_distance_m(s, p) < 0.4; })) return true;
+    }
+    return false;
+  };
+  for (int k = kCalmRun; k < 240 && changes["people"].size() < kPeople; k += 6) {
     const YAML::Node people = run(k)["people"];
     for (std::size_t i = 0; i < people.size() && changes["people"].size() < kPeople; ++i) {
       YAML::Node person = people[i];
+      if (in_the_way(person)) continue;
       person["name"] = fmt::format("person {}", changes["people"].size() + 1);
       changes["people"].push_back(person);
     }

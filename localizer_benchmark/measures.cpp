@@ -23,6 +23,8 @@ Moment ask(Localizer& localizer, const ScanRecording& drive, std::size_t i, cons
   if (i + 1 < drive.frames.size()) moment.dt_s = std::clamp(drive.frames[i + 1].stamp_s - frame.stamp_s, 0.0, 0.2);
   moment.has_pose = r.has_pose;
   moment.verdict = r.verdict;
+  moment.support = r.support;
+  moment.fresh_support = r.fresh_support;
   const Pose2 T_world_base = map.T_world_map * r.T_map_base;
   moment.error_m = distance_m(T_world_base, frame.T_world_base);
   moment.error_rad = std::fabs(normalize_angle_rad(T_world_base.yaw_rad - frame.T_world_base.yaw_rad));
@@ -150,7 +152,8 @@ RecoveryScore measure_starts(const ScanRecording& starts, const MapInWorld& map,
   return score;
 }
 
-RecoveryScore measure_kidnaps(const ScanRecording& drive, const MapInWorld& map, const LocalizerConfig& config) {
+RecoveryScore measure_kidnaps(const ScanRecording& drive, const MapInWorld& map, const LocalizerConfig& config,
+                              std::vector<Moment>* moments) {
   RecoveryScore score;
   Localizer localizer(config);
   localizer.set_map(map.map);
@@ -172,6 +175,7 @@ RecoveryScore measure_kidnaps(const ScanRecording& drive, const MapInWorld& map,
         helped = true;
       }
       m = ask(localizer, drive, i, map, &scan);
+      if (moments) moments->push_back(m);
       if (since_s <= kKidnapLimit_s && k > 0) {
         if (since_s > kGrace_s) {
           score.honesty.add(m);

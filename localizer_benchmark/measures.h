@@ -17,6 +17,7 @@ struct Moment {
   bool has_pose = false;
   LocalizationVerdict verdict = LocalizationVerdict::kInitializing;
   double error_m = 0.0, error_rad = 0.0;
+  double support = 0.0, fresh_support = 0.0;
   bool ok() const { return verdict == LocalizationVerdict::kOk; }
 };
 
@@ -64,6 +65,7 @@ TrackingScore measure_tracking(const ScanRecording& drive, const MapInWorld& map
 /// Each stretch is a start without a hint: right within 30 s?
 RecoveryScore measure_starts(const ScanRecording& starts, const MapInWorld& map, const LocalizerConfig& config);
 /// Each stretch after the first begins with a kidnap: noticed within 5 s, right again within 40 s?
-RecoveryScore measure_kidnaps(const ScanRecording& drive, const MapInWorld& map, const LocalizerConfig& config);
+RecoveryScore measure_kidnaps(const ScanRecording& drive, const MapInWorld& map, const LocalizerConfig& config,
+                              std::vector<Moment>* moments = nullptr);
 
 }  // namespace knav

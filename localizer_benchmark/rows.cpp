@@ -59,8 +59,8 @@ nlohmann::json recovery_json(const RecoveryScore& s) {
 }
 
 void write_trace(const std::string& path, const std::vector<Moment>& moments) {
-  std::string text = "stamp_s\tverdict\terror_m\terror_deg\n";
-  for (const Moment& m : moments) text += fmt::format("{:.3f}\t{}\t{:.3f}\t{:.2f}\n", m.stamp_s, verdict_name(m.verdict), m.error_m, m.error_rad * 180.0 / kPi);
+  std::string text = "stamp_s\tverdict\terror_m\terror_deg\tsupport\tfresh_support\n";
+  for (const Moment& m : moments) text += fmt::format("{:.3f}\t{}\t{:.3f}\t{:.2f}\t{:.3f}\t{:.3f}\n", m.stamp_s, verdict_name(m.verdict), m.error_m, m.error_rad * 180.0 / kPi, m.support, m.fresh_support);
   write_text_atomically(path, text);
 }
 
@@ -114,14 +114,14 @@ SimulatedDrive LocalizerRows::drive_of(std::size_t building, bool changed, const
   drive.tour_file = b.tour_file;
   if (changed || laid_out || b.tour_file.empty()) {
     drive.tour_file = fmt::format("{}/worlds/{}{}-{}_tour.yaml", options_.cache, b.name, changed ? "_changed" : "", drive.seed);
-    write_text_atomically(drive.tour_file, lay_out_drive(load_world(drive.world_file), kDrive_m, drive.seed));
+    write_text_atomically(drive.tour_file, lay_out_drive(load_world(drive.world_file), std::min(kDrive_m, options_.metres), drive.seed));
   }
   return drive;
 }
 
 LocalizerRows::Drives LocalizerRows::drives(std::size_t building, bool changed, const std::string& sensor, double metres, bool laid_out) {
   Drives drives;
-  const int count = options_.quick ? 1 : std::max(1, static_cast<int>(std::ceil(metres / kDrive_m - 0.2)));
+  const int count = options_.quick ? 1 : std::max(1, static_cast<int>(std::ceil(metres / kDrive_m - 0.2)));  // laid-out drives are a little longer
   for (int k = 0; k < count; ++k) {
     const SimulatedDrive drive = drive_of(building, changed, sensor, k, laid_out);
     drives.profiles.push_back(recordings_.get(drive));
@@ -202,7 +202,9 @@ nlohmann::json LocalizerRows::measure(const std::string& row, std::size_t buildi
     return json;
   }
   if (row == "kidnaps") {
-    json.update(recovery_json(measure_kidnaps(kidnap_scans(building), map, localizer_config_)));
+    std::vector<Moment> moments;
+    json.update(recovery_json(measure_kidnaps(kidnap_scans(building), map, localizer_config_, &moments)));
+    if (!trace.empty()) write_trace(fmt::format("{}/{}-kidnaps.tsv", trace, buildings_[building].name), moments);
     return json;
   }
   TrackingScore all;
