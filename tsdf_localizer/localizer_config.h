@@ -89,6 +89,7 @@ struct HealthConfig {
   }
   std::vector<std::string> validate() const {
     if (lost_fraction > ok_fraction) return {"health/lost_fraction must not exceed health/ok_fraction."};
+    if (lost_fraction > fresh_ok_fraction) return {"health/lost_fraction must not exceed health/fresh_ok_fraction."};
     return {};
   }
 };
