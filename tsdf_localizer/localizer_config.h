@@ -106,7 +106,7 @@ struct GlobalSearchConfig {
   int hypotheses = 24;
   int lookups_per_update = 3000000;
   double ambiguity_margin = 0.03;
-  int unseat_after = 4;
+  int unseat_after = 10;
   double repeat_after_m = 0.5;
   double repeat_after_rad = 0.5;
   double repeat_after_s = 1.0;
