@@ -82,9 +82,9 @@ void Belief::widen(double sd_m, double sd_rad) {
   stale_ = true;
 }
 
-void Belief::weigh(const CostField& field, const WeightedPoints& points, double temperature) {
+void Belief::weigh(const PriceField& field, const WeightedPoints& points, double temperature) {
   if (empty() || points.size() == 0) return;
-  alignment_costs(field, points, particles_, true, &cost_);
+  mean_prices(field, points, particles_, &cost_);
   weigh_by_cost(particles_, cost_, temperature);
   stale_ = true;
   const auto count = particles_.size();

@@ -4,10 +4,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/cost_field.h"
 #include "core/particle_filter.h"
 #include "tsdf_localizer/global_search.h"
 #include "tsdf_localizer/localizer_config.h"
+#include "tsdf_localizer/price_field.h"
 
 namespace knav {
 
@@ -32,7 +32,7 @@ class Belief {
   void widen(double sd_m, double sd_rad);
   /// Weighs by the price of the scan, then resamples if the weights have become uneven. A `temperature` that
   /// is high tempers evidence already used.
-  void weigh(const CostField& field, const WeightedPoints& points, double temperature);
+  void weigh(const PriceField& field, const WeightedPoints& points, double temperature);
   /// Gives `fraction` of the weight to new particles around the hypotheses, each by its price.
   void inject(const std::vector<Hypothesis>& hypotheses, double fraction, double temperature);
 

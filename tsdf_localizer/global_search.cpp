@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/cost_field.h"
 
 namespace knav {
 namespace {
@@ -90,7 +89,7 @@ std::size_t GlobalSearch::try_places(const MapFields& fields) {
     const auto heading = static_cast<double>((next_pose_ + k) % headings_);
     poses_.set(k, {p.x_m, p.y_m, normalize_angle_rad(2.0 * kPi * heading / static_cast<double>(headings_))});
   }
-  alignment_costs(fields.coarse, coarse_rays_.points, poses_, true, &cost_);
+  mean_prices(fields.coarse, coarse_rays_.points, poses_, &cost_);
   const GridGeometry& grid = fields.map.geometry;
   for (std::size_t k = 0; k < count; ++k) {
     const auto bx = static_cast<std::size_t>((poses_.x_m[k] - grid.origin_x_m) / kBin_m);
@@ -138,7 +137,7 @@ std::size_t GlobalSearch::refine(const MapFields& fields, Hypothesis* hypothesis
           }
         }
       }
-      alignment_costs(level.coarse ? fields.coarse : fields.fine, fine_rays_.points, poses_, true, &cost_);
+      mean_prices(level.coarse ? fields.coarse : fields.fine, fine_rays_.points, poses_, &cost_);
       lookups += 27 * fine_rays_.size();
       const auto winner =
           static_cast<std::size_t>(std::min_element(cost_.begin(), cost_.end()) - cost_.begin());

@@ -20,7 +20,7 @@ class Health {
   double support() const { return support_; }
   double fresh_support() const { return fresh_support_; }
   bool good() const {
-    return has_support_ && support_ >= config_.ok_fraction && fresh_support_ >= config_.lost_fraction;
+    return has_support_ && support_ >= config_.ok_fraction && fresh_support_ >= config_.fresh_ok_fraction;
   }
   /// Very bad for long enough.
   bool lost() const { return has_support_ && low_s_ >= config_.lost_after_s; }

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/config.h"
 #include "tsdf_localizer/belief.h"
@@ -38,6 +39,8 @@ struct Localizer::State {
   void filter(double stamp_s);
   void judge(double stamp_s);
   void decide();
+  void break_with_the_past();
+  double evidence_min(double stamp_s) const;
   Pose2 pose_now() { return belief.estimate().pose.mean * T_filter_now; }
 
   LocalizerConfig config;
@@ -56,6 +59,10 @@ struct Localizer::State {
       T_filter_now;  ///< the last is the motion that the belief has not been told yet
   bool has_odom = false;
   double last_s = 0.0, filtered_s = 0.0;
+  /// What was seen before is not to be trusted: perhaps the robot was carried away then. While it is in doubt, and after, if
+  /// it turns out to be elsewhere.
+  std::optional<double> break_s;
+  Pose2 T_tracked;  ///< where it would be now had it not been carried
 };
 
 Localizer::Localizer(const LocalizerConfig& config) : state_(std::make_unique<State>(config)) {
@@ -88,6 +95,7 @@ void Localizer::initialize(const Pose2& T_map_base, const Eigen::Matrix3d& covar
   s.search.doubt(trust == Trust::kGiven ? PoseSearch::Prior::kGiven : PoseSearch::Prior::kLocal,
                  trust == Trust::kGiven ? "a pose was given, to be confirmed" : "a saved pose is tried");
   s.health.clear();
+  s.break_s.reset();
   s.lost = false;
   s.forced = true;
 }
@@ -98,6 +106,7 @@ void Localizer::initialize_globally() {
   s.T_filter_now = Pose2();
   s.search.doubt(PoseSearch::Prior::kNone, "searching the map");
   s.health.clear();
+  s.break_s.reset();
   s.lost = false;
 }
 
@@ -131,7 +140,7 @@ const LocalizerResult& Localizer::update(const RangeScan& scan, const Pose2& T_b
     s.refuse("the scan is older than the one before it");
     return s.result;
   }
-  if (!select_rays(scan, T_base_sensor, s.config, s.scans, &s.rays)) {
+  if (!select_rays(scan, T_base_sensor, s.config, s.scans, s.evidence_min(scan.stamp_s), &s.rays)) {
     s.refuse("the scan has no rays, or its angles are not finite");
     return s.result;
   }
@@ -160,6 +169,7 @@ void Localizer::State::take_motion(const Pose2& T_local_base, std::uint32_t new_
   } else {
     const Pose2 T_step = T_local_last.inverse() * T_local_base;
     T_filter_now = T_filter_now * T_step;
+    T_tracked = T_tracked * T_step;
     search.move(T_step);
   }
   has_motion = true;
@@ -171,6 +181,7 @@ void Localizer::State::take_motion(const Pose2& T_local_base, std::uint32_t new_
 
 void Localizer::State::begin_epoch(std::uint32_t new_epoch, const Pose2* T_odom_base) {
   epoch = new_epoch;
+  break_s.reset();  // the local mapper has forgotten the old place, too
   search.cut();
   if (belief.empty()) return;
   if (has_odom && T_odom_base != nullptr && is_finite(*T_odom_base)) {
@@ -182,6 +193,20 @@ void Localizer::State::begin_epoch(std::uint32_t new_epoch, const Pose2* T_odom_
   search.doubt(PoseSearch::Prior::kLocal, "the motion estimate began anew: carried, or reset");
   health.judge_anew();
   forced = true;
+}
+
+/// The view just now contradicts the map though the pose was tracked. People and moved furniture do that, and so does being
+/// carried away, which the local mapper does not always notice: its scan then shows the old place in 303 of 360 degrees. Only
+/// what is seen from now on can tell.
+void Localizer::State::break_with_the_past() {
+  constexpr double kNoticedAfter_s = 1.5;  // smoothing, and the time that the verdict takes
+  if (break_s || belief.empty()) return;
+  break_s = last_s - kNoticedAfter_s;
+  T_tracked = pose_now();
+}
+
+double Localizer::State::evidence_min(double stamp_s) const {
+  return break_s ? std::exp(-std::max(0.0, stamp_s - *break_s) / config.measurement.evidence_decay_s) : 0.0;
 }
 
 void Localizer::State::filter(double stamp_s) {
@@ -225,6 +250,8 @@ void Localizer::State::judge(double stamp_s) {
     }
   }
   result.particles = static_cast<std::uint32_t>(belief.particles().size());
+  result.support = health.support();
+  result.fresh_support = health.fresh_support();
   result.inlier_fraction = check.inlier_fraction();
   result.explained_rays = check.explained;
   result.unexplained_rays = check.in_front + check.through;
@@ -247,9 +274,11 @@ void Localizer::State::decide() {
   }
   if (!search.in_doubt()) {
     lost = false;
+    if (break_s && same_place(T_tracked, result.T_map_base)) break_s.reset();  // nobody has carried it
     if (!health.good() && (health.support() < config.health.ok_fraction ||
-                           health.fresh_support() < config.health.lost_fraction)) {
+                           health.fresh_support() < config.health.fresh_ok_fraction)) {
       search.doubt(PoseSearch::Prior::kTracked, "");
+      break_with_the_past();
     }
   } else if (search.prior() == PoseSearch::Prior::kGiven && health.good() && !config.global_search.enabled) {
     search.end_doubt();
@@ -259,6 +288,7 @@ void Localizer::State::decide() {
     // Before moved furniture as little may be explained as after a kidnap: where the robot was is still the best guess.
     const bool found_by_search = search.in_doubt() && search.prior() == PoseSearch::Prior::kNone;
     search.doubt(found_by_search ? PoseSearch::Prior::kNone : PoseSearch::Prior::kTracked, "lost");
+    break_with_the_past();
   } else if (lost && health.good()) {
     lost = false;  // looking round showed more of what the map knows
   }

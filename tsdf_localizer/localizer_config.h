@@ -13,6 +13,8 @@ struct MeasurementConfig {
   double unknown_cost = 0.5;
   double temperature = 0.006;
   double evidence_min = 0.02;
+  double evidence_power = 1.0;
+  double evidence_decay_s = 30.0;
   double noise_m = 0.05;
   double noise_per_range_squared = 0.002;
   double fresh_after_m = 0.3;
@@ -29,6 +31,10 @@ struct MeasurementConfig {
              "Rise of the mean price that makes a pose e times less likely, for a scan of all new evidence.");
     v.number("evidence_min", evidence_min, 0, 1, "",
              "Rays with less evidence (intensities of scan_360) are left out.");
+    v.number("evidence_power", evidence_power, 0, 10, "",
+             "A ray weighs its evidence to this power: what is old has moved with the local map's drift.");
+    v.number("evidence_decay_s", evidence_decay_s, 0.1, 10000, "s",
+             "After how long without a view the scan's evidence has fallen to 1/e (local_mapper's contour/evidence_decay_s).");
     v.number("noise_m", noise_m, 0.005, 1, "m",
              "Noise (sd) of a near reading; sets the weight of far ones beside it.");
     v.number("noise_per_range_squared", noise_per_range_squared, 0, 0.1, "1/m",
@@ -47,6 +53,7 @@ struct HealthConfig {
   double explained_m = 0.15;
   double explained_per_range = 0.03;
   double ok_fraction = 0.60;
+  double fresh_ok_fraction = 0.60;
   double lost_fraction = 0.40;
   double smoothing_s = 0.7;
   double lost_after_s = 1.5;
@@ -63,6 +70,8 @@ struct HealthConfig {
              "... plus this much per metre of range.");
     v.number("ok_fraction", ok_fraction, 0, 1, "",
              "Smoothed fraction of explained rays below which the verdict is no longer ok.");
+    v.number("fresh_ok_fraction", fresh_ok_fraction, 0, 1, "",
+             "The same, of the rays seen just now; a view that ends in front of every wall scores 0.5.");
     v.number("lost_fraction", lost_fraction, 0, 1, "",
              "Smoothed fraction of explained rays below which the robot is lost.");
     v.number("smoothing_s", smoothing_s, 0, 10, "s", "Time constant of that smoothing.");
@@ -80,6 +89,7 @@ struct HealthConfig {
   }
   std::vector<std::string> validate() const {
     if (lost_fraction > ok_fraction) return {"health/lost_fraction must not exceed health/ok_fraction."};
+    if (lost_fraction > fresh_ok_fraction) return {"health/lost_fraction must not exceed health/fresh_ok_fraction."};
     return {};
   }
 };
@@ -96,7 +106,7 @@ struct GlobalSearchConfig {
   int hypotheses = 24;
   int lookups_per_update = 3000000;
   double ambiguity_margin = 0.03;
-  int unseat_after = 4;
+  int unseat_after = 10;
   double repeat_after_m = 0.5;
   double repeat_after_rad = 0.5;
   double repeat_after_s = 1.0;

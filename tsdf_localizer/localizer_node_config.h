@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/pose2.h"
+#include "tsdf_localizer/correction.h"
 #include "tsdf_localizer/localizer_config.h"
 
 namespace knav {
@@ -22,6 +23,7 @@ struct LocalizerNodeConfig {
   double transform_tolerance = 0.1;
   bool tf_broadcast = true;
   double tf_rate_hz = 30.0;
+  SlewLimit slew;
   std::string initial_pose_x, initial_pose_y, initial_pose_a;  ///< texts, so that they can be left open
   double initial_cov_xx = 0.25, initial_cov_yy = 0.25, initial_cov_aa = 0.0685;
   double save_pose_rate = 0.2;
@@ -41,6 +43,11 @@ struct LocalizerNodeConfig {
              "How far the published map->odom is post-dated (amcl).");
     v.flag("tf_broadcast", tf_broadcast, "Publish map->odom (amcl).");
     v.number("tf_rate_hz", tf_rate_hz, 1, 1000, "Hz", "Rate of map->odom, whatever the scans do.");
+    v.number("slew_limit_mps", slew.speed_mps, 0, 100, "m/s",
+             "How fast map->odom may move the robot in the map; 0: at once, as amcl.");
+    v.number("slew_limit_radps", slew.turn_radps, 0, 100, "rad/s", "How fast it may turn the robot; 0: at once.");
+    v.number("slew_jump_m", slew.jump_m, 0, 1000, "m", "A correction larger than this is taken at once in any case, ...");
+    v.number("slew_jump_rad", slew.jump_rad, 0, 4, "rad", "... or than this.");
     v.text("initial_pose_x", initial_pose_x,
            "Pose to start from [m]; all three empty: unknown, see saved_pose_file (amcl).");
     v.text("initial_pose_y", initial_pose_y, "Pose to start from [m] (amcl).");

@@ -40,7 +40,8 @@ void LocalizerNodelet::start() {
   saved_pose_file_ = saved_pose_path(config_.saved_pose_file);
   localizer_ = std::make_unique<Localizer>(config_.localizer);
   broadcaster_ = std::make_unique<MapOdomBroadcaster>(config_.global_frame_id, config_.odom_frame_id,
-                                                      config_.transform_tolerance);
+                                                      config_.transform_tolerance, config_.slew);
+  diagnostics_ = std::make_unique<LocalizerDiagnostics>(nh, private_nh, getName());
   inbox_ = std::make_unique<ScanInbox>(config_, tf_);
   listener_ = std::make_unique<tf2_ros::TransformListener>(tf_);
   last_scan_wall_ = ros::WallTime::now();
@@ -172,8 +173,14 @@ void LocalizerNodelet::on_initial_pose(const geometry_msgs::PoseWithCovarianceSt
 
 bool LocalizerNodelet::on_set_map(nav_msgs::SetMap::Request& request, nav_msgs::SetMap::Response& response) {
   try {
-    response.success = take_map(distance_from_occupancy(occupancy_from(request.map)), "set_map") &&
-                       take_pose(request.initial_pose, "set_map");
+    const OccupancyGrid occupancy = occupancy_from(request.map);
+    if (has_distance_map_ && shows_the_same(localizer_->map(), occupancy)) {
+      // the map server's load_map calls this with the occupancy of the map whose better distances are here already
+      NODELET_INFO("localizer: set_map brings the map that is used; only its pose is taken.");
+      response.success = take_pose(request.initial_pose, "set_map");
+      return true;
+    }
+    response.success = take_map(distance_from_occupancy(occupancy), "set_map") && take_pose(request.initial_pose, "set_map");
     has_distance_map_ = true;  // as amcl: what set_map gave is not replaced by the topic's map
   } catch (const UserError& error) {
     NODELET_ERROR("localizer: set_map: %s", error.what());
@@ -247,9 +254,11 @@ void LocalizerNodelet::process(const ScanInput& input) {
   scan_from(*input.scan, &scan_);
   if (config_.intensities == "ignore") scan_.evidence.clear();
   if (config_.intensities == "auto") drop_intensities_that_are_not_evidence(&scan_);
+  const ros::WallTime begin_time = ros::WallTime::now();
   const LocalizerResult& result =
       localizer_->update(scan_, input.T_base_sensor, input.T_local_base, input.epoch,
                          input.T_odom_base ? &*input.T_odom_base : nullptr);
+  diagnostics_->update((ros::WallTime::now() - begin_time).toSec());
   if (!result.accepted) {
     if (!localizer_->has_map()) {
       NODELET_WARN_THROTTLE(kComplainEvery_s, "localizer: scans come but no map yet; waiting for %s or %s.",
@@ -265,13 +274,32 @@ void LocalizerNodelet::process(const ScanInput& input) {
   remember_pose(result.stamp_s, false);
   if (!result.has_pose) return;
   if (input.T_odom_base) {
-    broadcaster_->set(result.T_map_base, *input.T_odom_base);
+    correct(result, *input.T_odom_base);
   } else {
     NODELET_WARN_THROTTLE(
         kComplainEvery_s,
         "localizer: no transform from '%s' to '%s' at the scan's stamp; map->odom stays as it was.",
         config_.odom_frame_id.c_str(), config_.base_frame_id.c_str());
   }
+}
+
+void LocalizerNodelet::correct(const LocalizerResult& result, const Pose2& T_odom_base) {
+  if (broadcaster_->known() && result.filter_updated) {
+    const Correction correction = rate_correction(broadcaster_->T_map_odom(), result.T_map_base * T_odom_base.inverse(),
+                                                  T_odom_base, position_sd_m_, yaw_sd_rad_);
+    diagnostics_->correction(correction);
+    const std::string text = "localizer: " + correction.sentence() + ".";
+    if (correction.rating == Correction::Rating::kSmall) {
+      NODELET_DEBUG("%s", text.c_str());
+    } else if (correction.rating == Correction::Rating::kNotable) {
+      NODELET_INFO("%s", text.c_str());
+    } else {
+      NODELET_WARN("%s", text.c_str());
+    }
+  }
+  position_sd_m_ = result.position_sd_m;
+  yaw_sd_rad_ = result.yaw_sd_rad;
+  broadcaster_->set(result.T_map_base, T_odom_base);
 }
 
 void LocalizerNodelet::publish(const LocalizerResult& result) {
@@ -315,6 +343,7 @@ void LocalizerNodelet::publish_status(const LocalizerResult& result) {
   status.particles = result.particles;
   status.motion_epoch = inbox_->mapper_epoch();
   status_pub_.publish(status);
+  diagnostics_->status(result);
   last_status_wall_ = ros::WallTime::now();
 }
 

@@ -18,6 +18,7 @@
 #include "ros_common/clock_watch.h"
 #include "ros_common/nodelet_base.h"
 #include "tsdf_localizer/localizer.h"
+#include "tsdf_localizer/localizer_diagnostics.h"
 #include "tsdf_localizer/localizer_node_config.h"
 #include "tsdf_localizer/map_odom_broadcaster.h"
 #include "tsdf_localizer/saved_pose.h"
@@ -52,6 +53,7 @@ class LocalizerNodelet : public NodeletBase {
   void publish(const LocalizerResult& result);
   void publish_status(const LocalizerResult& result);
   void log_verdict(const LocalizerResult& result);
+  void correct(const LocalizerResult& result, const Pose2& T_odom_base);
   void remember_pose(double now_s, bool at_end);
 
   LocalizerNodeConfig config_;
@@ -60,6 +62,7 @@ class LocalizerNodelet : public NodeletBase {
   std::unique_ptr<tf2_ros::TransformListener> listener_;
   std::unique_ptr<MapOdomBroadcaster> broadcaster_;
   std::unique_ptr<ScanInbox> inbox_;
+  std::unique_ptr<LocalizerDiagnostics> diagnostics_;
   ClockWatch scan_clock_, timer_clock_;
 
   ros::Subscriber scan_sub_, motion_sub_, distance_map_sub_, map_sub_, initial_pose_sub_;
@@ -73,6 +76,7 @@ class LocalizerNodelet : public NodeletBase {
   Pose2 T_map_base_saved_;
   bool has_saved_ = false;
   double saved_s_ = 0.0;
+  double position_sd_m_ = 0.0, yaw_sd_rad_ = 0.0;  ///< when map->odom was last corrected
   LocalizationVerdict last_verdict_ = LocalizationVerdict::kInitializing;
   ros::WallTime last_scan_wall_, last_cloud_wall_, last_status_wall_;
 };

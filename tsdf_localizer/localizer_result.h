@@ -23,6 +23,7 @@ struct LocalizerResult {
   LocalizationVerdict verdict = LocalizationVerdict::kInitializing;
   std::string reason;
   double inlier_fraction = 0.0;  ///< explained / (explained + unexplained), of this scan
+  double support = 0.0, fresh_support = 0.0;  ///< smoothed; see Health
   std::uint32_t explained_rays = 0, unexplained_rays = 0, unknown_rays = 0;
   double position_sd_m = 0.0;  ///< largest principal standard deviation
   double yaw_sd_rad = 0.0;

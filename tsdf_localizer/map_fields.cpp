@@ -15,32 +15,31 @@ double price(float distance_m, double truncation_m, double unknown_cost) {
   return std::isfinite(distance_m) ? std::min(1.0, std::fabs(distance_m) / truncation_m) : unknown_cost;
 }
 
-CostField fine_field(const DistanceMap& map, const MeasurementConfig& config) {
-  CostField field(map.geometry, config.unknown_cost);
-  for (int iy = 0; iy < map.geometry.height_cells; ++iy) {
-    for (int ix = 0; ix < map.geometry.width_cells; ++ix) {
-      field.set(ix, iy, price(map.at(ix, iy), config.truncation_m, config.unknown_cost));
-    }
+PriceField fine_field(const DistanceMap& map, const MeasurementConfig& config) {
+  std::vector<std::uint8_t> prices(map.distance_m.size());
+  const auto to_price = static_cast<float>(255.0 / config.truncation_m);
+  const std::uint8_t unknown = quantized_price(config.unknown_cost);
+  for (std::size_t i = 0; i < prices.size(); ++i) {
+    const float price = std::fabs(map.distance_m[i]) * to_price;  // NaN where unknown
+    prices[i] = price >= 0.0f ? static_cast<std::uint8_t>(std::min(255.0f, price + 0.5f)) : unknown;
   }
-  return field;
+  return {map.geometry, prices, unknown};
 }
 
-CostField coarse_field(const DistanceMap& map, double truncation_m, double unknown_cost) {
+PriceField coarse_field(const DistanceMap& map, double truncation_m, double unknown_cost) {
   const GridGeometry& fine = map.geometry;
   const int factor = std::max(1, static_cast<int>(std::lround(kCoarseCell_m / fine.resolution_m)));
   GridGeometry coarse = fine;
   coarse.resolution_m = fine.resolution_m * factor;
   coarse.width_cells = (fine.width_cells + factor - 1) / factor;
   coarse.height_cells = (fine.height_cells + factor - 1) / factor;
-  CostField field(coarse, unknown_cost);
+  std::vector<std::uint8_t> prices(coarse.cell_count());
   for (int iy = 0; iy < coarse.height_cells; ++iy) {
     for (int ix = 0; ix < coarse.width_cells; ++ix) {
-      field.set(
-          ix, iy,
-          price(map.at(ix * factor + factor / 2, iy * factor + factor / 2), truncation_m, unknown_cost));
+      prices[coarse.index(ix, iy)] = quantized_price(price(map.at(ix * factor + factor / 2, iy * factor + factor / 2), truncation_m, unknown_cost));
     }
   }
-  return field;
+  return {coarse, prices, quantized_price(unknown_cost)};
 }
 
 std::vector<Point2> free_positions(const DistanceMap& map, const GlobalSearchConfig& config) {
@@ -62,6 +61,24 @@ std::vector<Point2> free_positions(const DistanceMap& map, const GlobalSearchCon
 }
 
 }  // namespace
+
+bool shows_the_same(const DistanceMap& map, const OccupancyGrid& occupancy) {
+  constexpr std::int8_t kOccupied = 65;   // map_server's threshold
+  constexpr double kAgreeing = 0.95;
+  const GridGeometry &a = map.geometry, &b = occupancy.geometry;
+  const double tolerance_m = 0.01 * a.resolution_m;
+  if (a.width_cells != b.width_cells || a.height_cells != b.height_cells || occupancy.value.size() != map.distance_m.size() ||
+      !(std::fabs(a.resolution_m - b.resolution_m) < 1e-6) || !(std::fabs(a.origin_x_m - b.origin_x_m) < tolerance_m) ||
+      !(std::fabs(a.origin_y_m - b.origin_y_m) < tolerance_m))
+    return false;
+  std::size_t walls = 0, agreeing = 0;
+  for (std::size_t i = 0; i < occupancy.value.size(); ++i) {
+    if (occupancy.value[i] < kOccupied) continue;
+    ++walls;
+    agreeing += map.distance_m[i] < 1.5 * a.resolution_m;  // negative behind a surface; false for NaN
+  }
+  return static_cast<double>(agreeing) >= kAgreeing * static_cast<double>(walls);
+}
 
 MapFields make_map_fields(const DistanceMap& map, const MeasurementConfig& measurement,
                           const GlobalSearchConfig& search) {

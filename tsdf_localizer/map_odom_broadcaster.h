@@ -6,18 +6,21 @@
 #include <string>
 
 #include "core/pose2.h"
+#include "tsdf_localizer/correction.h"
 
 namespace knav {
 
-/// Publishes map->odom whenever asked (by a timer), post-dated, never a stamp twice.
+/// Publishes map->odom whenever asked (by a timer), post-dated, never a stamp twice; led after the estimate if it is limited.
 class MapOdomBroadcaster {
  public:
-  MapOdomBroadcaster(std::string map_frame, std::string odom_frame, double tolerance_s)
-      : map_frame_(std::move(map_frame)), odom_frame_(std::move(odom_frame)), tolerance_(tolerance_s) {}
+  MapOdomBroadcaster(std::string map_frame, std::string odom_frame, double tolerance_s, const SlewLimit& limit)
+      : map_frame_(std::move(map_frame)), odom_frame_(std::move(odom_frame)), tolerance_(tolerance_s), limit_(limit) {}
 
   /// Both poses at the same stamp.
   void set(const Pose2& T_map_base, const Pose2& T_odom_base) {
     T_map_odom_ = T_map_base * T_odom_base.inverse();
+    T_odom_base_ = T_odom_base;
+    if (!known_) T_published_ = T_map_odom_;
     known_ = true;
   }
   void forget() {
@@ -33,7 +36,8 @@ class MapOdomBroadcaster {
   std::string map_frame_, odom_frame_;
   ros::Duration tolerance_;
   tf2_ros::TransformBroadcaster broadcaster_;
-  Pose2 T_map_odom_;
+  SlewLimit limit_;
+  Pose2 T_map_odom_, T_odom_base_, T_published_;
   bool known_ = false;
   ros::Time last_sent_;
 };

@@ -6,7 +6,8 @@
 namespace knav {
 namespace {
 
-constexpr float kFreshEvidence = 0.8f;
+/// The camera's view just now, and no more: what was seen a few seconds ago is the old place's after a kidnap.
+constexpr float kFreshEvidence = 0.97f;
 constexpr std::uint32_t kFreshRaysMin = 30;
 
 /// True if the segment from the sensor meets a surface more than `slack_m` before its end. Sphere tracing:

@@ -13,7 +13,7 @@ void ScanRays::clear() {
 }
 
 bool select_rays(const RangeScan& scan, const Pose2& T_base_sensor, const LocalizerConfig& config,
-                 std::size_t phase, ScanRays* rays) {
+                 std::size_t phase, double evidence_min, ScanRays* rays) {
   rays->clear();
   rays->T_base_sensor = T_base_sensor;
   const std::size_t count = scan.range_m.size();
@@ -24,6 +24,7 @@ bool select_rays(const RangeScan& scan, const Pose2& T_base_sensor, const Locali
   const auto wanted = static_cast<std::size_t>(config.laser_max_beams);
   const std::size_t stride = (count + wanted - 1) / wanted;
   const bool has_evidence = scan.evidence.size() == count;
+  evidence_min = std::max(evidence_min, config.measurement.evidence_min);
   const double low_m = std::max(config.laser_min_range, scan.range_min_m);
   const double high_m = config.laser_max_range >= 0.0 ? config.laser_max_range : 1e9;
   for (std::size_t i = phase % stride; i < count; i += stride) {
@@ -31,7 +32,7 @@ bool select_rays(const RangeScan& scan, const Pose2& T_base_sensor, const Locali
     const double evidence = has_evidence ? std::min(1.0f, scan.evidence[i]) : 1.0;
     // the comparisons are false for NaN
     if (!(std::isfinite(range) && range > 0.0 && range >= low_m && range <= high_m) ||
-        !(evidence > 0.0 && evidence >= config.measurement.evidence_min)) {
+        !(evidence > 0.0 && evidence >= evidence_min)) {
       ++rays->unknown;
       continue;
     }
@@ -40,7 +41,7 @@ bool select_rays(const RangeScan& scan, const Pose2& T_base_sensor, const Locali
     const double noise_m =
         config.measurement.noise_m + config.measurement.noise_per_range_squared * range * range;
     rays->points.add(static_cast<float>(p.x_m), static_cast<float>(p.y_m),
-                     static_cast<float>(evidence * config.measurement.noise_m / noise_m));
+                     static_cast<float>(std::pow(evidence, config.measurement.evidence_power) * config.measurement.noise_m / noise_m));
     rays->range_m.push_back(static_cast<float>(range));
     rays->evidence.push_back(static_cast<float>(evidence));
   }

@@ -3,10 +3,10 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/cost_field.h"
 #include "core/pose2.h"
 #include "core/range_scan.h"
 #include "tsdf_localizer/localizer_config.h"
+#include "tsdf_localizer/price_field.h"
 
 namespace knav {
 
@@ -26,8 +26,9 @@ struct ScanRays {
 ///
 /// A ray's weight is its evidence, times noise_m over its noise: a reading at 10 m may be 0.2 m wrong and
 /// must not weigh as much as ten near ones.
+/// @param evidence_min rays with less are left out, beside those that the configuration leaves out
 bool select_rays(const RangeScan& scan, const Pose2& T_base_sensor, const LocalizerConfig& config,
-                 std::size_t phase, ScanRays* rays);
+                 std::size_t phase, double evidence_min, ScanRays* rays);
 
 /// Every n-th of them, so that at most `count` remain.
 void thin_out(const ScanRays& rays, std::size_t count, ScanRays* fewer);

@@ -1,4 +1,5 @@
 // What amcl's clients rely on, against the running node. The tests are steps of one story and run in order.
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <gtest/gtest.h>
@@ -295,6 +296,27 @@ TEST(AmclClients, K_SetMapTakesMapAndPose) {
   ASSERT_TRUE(ros::service::call("set_map", call));
   EXPECT_TRUE(call.response.success);
   EXPECT_TRUE(robot->turn_until(Status::OK, 40)) << robot->status.reason;
+}
+
+TEST(AmclClients, KA_DiagnosticsTellVerdictSpreadAndCorrections) {
+  std::map<std::string, std::string> values;
+  std::string message;
+  const ros::Subscriber sub = robot->nh.subscribe<diagnostic_msgs::DiagnosticArray>(
+      "/diagnostics", 10, [&](const diagnostic_msgs::DiagnosticArray::ConstPtr& array) {
+        for (const auto& status : array->status) {
+          message = status.message;
+          for (const auto& pair : status.values) values[pair.key] = pair.value;
+        }
+      });
+  for (int i = 0; i < 200 && message.rfind("ok", 0) != 0; ++i) {
+    ASSERT_TRUE(robot->step());
+    robot->spin(0.02);
+  }
+  ASSERT_EQ(message.rfind("ok", 0), 0u) << message;
+  EXPECT_GT(std::stod(values["position sd m"]), 0.0);
+  EXPECT_LT(std::stod(values["position sd m"]), 0.5);
+  EXPECT_GT(std::stod(values["heading sd deg"]), 0.0);
+  EXPECT_EQ(values.count("corrections, jumps"), 1u);
 }
 
 TEST(AmclClients, L_AClockThatJumpsBackStartsAnew) {
