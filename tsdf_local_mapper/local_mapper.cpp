@@ -96,7 +96,7 @@ struct LocalMapper::State {
   void note_motion(double stamp_s);
   void select_points(const TsdfObservation& observation, const Pose2& T_base_sensor);
   float weight_of(const TsdfObservation& observation, std::size_t column) const;
-  double evidence_of(double dt_s, double turn_rad) const;
+  double evidence_of(double dt_s) const;
   template <class Frame>
   void observe(const Frame& frame);
   void align(const Pose2& T_step, const Pose2& T_base_sensor, double dt_s);
@@ -217,12 +217,9 @@ float LocalMapper::State::weight_of(const TsdfObservation& o, std::size_t column
 
 /// How much of a frame's evidence is new. A Kinect's bands, blobs of noise and wrong scale stay for many
 /// frames; taken for new evidence thirty times a second they pull the estimate after them.
-double LocalMapper::State::evidence_of(double dt_s, double turn_rad) const {
-  const FilterConfig& filter_config = config.filter;
-  if (filter_config.evidence_period_s <= 0.0 || filter_config.alignment_cost == "paper") return 1.0;
-  const double turned =
-      filter_config.evidence_turn_rad > 0.0 ? std::fabs(turn_rad) / filter_config.evidence_turn_rad : 0.0;
-  return std::clamp(dt_s / filter_config.evidence_period_s + turned, 0.02, 1.0);
+double LocalMapper::State::evidence_of(double dt_s) const {
+  if (config.filter.evidence_period_s <= 0.0 || config.filter.alignment_cost == "paper") return 1.0;
+  return std::clamp(dt_s / config.filter.evidence_period_s, 0.02, 1.0);
 }
 
 /// The frame as the window's next observation.
@@ -280,7 +277,7 @@ void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, 
   } else {
     filter.predict(T_step);
     if (readings) {
-      filter.update(grid, &points, result.stamp_s, evidence_of(dt_s, T_step.yaw_rad));
+      filter.update(grid, &points, result.stamp_s, evidence_of(dt_s));
     } else {
       filter.estimate_from_particles();
     }

@@ -24,7 +24,6 @@ struct FilterConfig {
   int refinements = 0;
   double depth_trust_m = 3.0;
   double evidence_period_s = 0.3;
-  double evidence_turn_rad = 0.1;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -52,9 +51,6 @@ struct FilterConfig {
              "Frames closer together than this share errors, and so count by the share of it that has "
              "passed; 0 = every frame "
              "in full.");
-    v.number("evidence_turn_rad", evidence_turn_rad, 0, 10, "rad",
-             "A turn shows each thing to other columns, with other errors: a turn by this much is as new as evidence_period_s. 0 = only "
-             "time counts.");
   }
 };
 
