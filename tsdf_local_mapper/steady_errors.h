@@ -13,7 +13,7 @@ namespace knav {
 
 /// What may be steadily wrong with odometry: wheels of another size, another distance between them, a skewed mount.
 struct SteadyErrorsConfig {
-  double memory_m = 20000.0;
+  double memory_m = 2000.0;
   double distance_scale_sd = 0.03;
   double turn_per_m_sd = 0.02;
   double turn_scale_sd = 0.05;
