@@ -35,6 +35,7 @@ RoomWorld hall() {
 RangeOffsets learned_of(const OffsetOf& offset) {
   LocalMapperConfig config;
   config.filter.particles = 200;
+  config.range_errors.learn = true;
   config.range_errors.bands = kBands;
   LocalMapper mapper(config);
   const RoomWorld world = hall();
@@ -104,7 +105,9 @@ TEST_F(RangeErrorsTest, WhatAllColumnsHaveInCommonIsLeftToTheCalibration) {
 }
 
 TEST_F(RangeErrorsTest, AScannerIsNotCorrected) {
-  LocalMapper mapper{LocalMapperConfig{}};
+  LocalMapperConfig config;
+  config.range_errors.learn = true;
+  LocalMapper mapper(config);
   const RoomWorld world = hall();
   DrivenRobot robot;
   for (int i = 0; i < 400; ++i) {
