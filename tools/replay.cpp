@@ -38,6 +38,9 @@ void replay(const Options& options) {
   ObservationReaderConfig reader_config;
   reader_config.source = options.from;
   ObservationReader reader(options.bag, reader_config, FrontEndConfig::from_file(options.config));
+  if (!options.range_errors.empty() && !mapper_config.range_errors.learn) {
+    throw UserError("--range-errors needs local_mapper/range_errors/learn: true in the configuration (--config).");
+  }
   LocalMapper mapper(mapper_config);
   if (!options.range_errors.empty() && std::filesystem::exists(options.range_errors)) {
     mapper.start_from(RangeOffsets::load(options.range_errors));

@@ -38,6 +38,9 @@ std::vector<std::string> LocalMapperConfig::validate() const {
   if (window.parked_observations > window.max_observations) {
     faults.push_back("window/parked_observations must not exceed window/max_observations.");
   }
+  if (!ros.range_errors_file.empty() && !range_errors.learn) {
+    faults.push_back("ros/range_errors_file is set, but range_errors/learn is off, so that nothing would be read from it or kept.");
+  }
   for (const std::string& fault : motion.validate()) faults.push_back("motion: " + fault);
   for (const std::string& fault : tsdf.validate()) faults.push_back("tsdf: " + fault);
   return faults;

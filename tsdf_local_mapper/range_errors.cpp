@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/error.h"
+
 namespace knav {
 namespace {
 constexpr double kSeenAgain_m = 10.0;  ///< driven since, so that what was far has been near
@@ -39,7 +41,9 @@ RangeErrors::RangeErrors(const RangeErrorsConfig& config, const TsdfConfig& tsdf
 
 void RangeErrors::start_from(const RangeOffsets& offsets) {
   const auto from = static_cast<int>(offsets.offset_per_m.size());
-  if (from < 2 || offsets.sd_per_m.size() != offsets.offset_per_m.size()) return;
+  if (from < 2 || offsets.sd_per_m.size() != offsets.offset_per_m.size()) {
+    throw UserError("learned range errors: there must be as many deviations as offsets, at least two.");
+  }
   information_ = prior_;
   for (int band = 0; band < config_.bands; ++band) {
     const double at = (band + 0.5) * from / config_.bands - 0.5;

@@ -56,7 +56,7 @@ class RangeErrors {
   RangeErrors(const RangeErrorsConfig& config, const TsdfConfig& tsdf);
 
   bool on() const { return config_.learn; }
-  /// Begins with what an earlier drive learned, taken at its standard deviations.
+  /// Begins with what an earlier drive learned, taken at its standard deviations. UserError if they do not belong together.
   void start_from(const RangeOffsets& offsets);
   /// Another map: its poses have nothing to do with those before. What was learned stays: it is the same camera.
   void new_map();

@@ -126,6 +126,7 @@ TEST_F(RangeErrorsTest, TheFileGivesBackWhatWasKeptAlsoForOtherBands) {
   }
   kept.save(path_);
   LocalMapperConfig config;
+  config.range_errors.learn = true;
   config.range_errors.bands = 40;
   LocalMapper mapper(config);
   mapper.start_from(RangeOffsets::load(path_));
@@ -134,6 +135,15 @@ TEST_F(RangeErrorsTest, TheFileGivesBackWhatWasKeptAlsoForOtherBands) {
   // Band 11 of 40 lies a quarter of the way from the middle of band 5 of 20 to that of band 6... by hand: (11.5 / 40) * 20 - 0.5.
   EXPECT_NEAR(got.offset_per_m[11], 1e-4 * (5.25 - 9.5), 2e-6);
   EXPECT_NEAR(got.sd_per_m[11], 2e-4, 1e-5);  // the mean of all being known makes it a little less
+}
+
+TEST_F(RangeErrorsTest, AFileIsNotTakenWhereNothingIsLearned) {
+  LocalMapperConfig config;
+  config.ros.range_errors_file = path_;
+  config.range_errors.learn = false;
+  EXPECT_EQ(config.validate().size(), 1u);
+  config.range_errors.learn = true;
+  EXPECT_TRUE(config.validate().empty());
 }
 
 TEST_F(RangeErrorsTest, AFileThatIsNoneIsRefusedByName) {
