@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "brin_benchmark/benchmark_folder.h"
 #include "brin_benchmark/benchmark_report.h"
 #include "brin_benchmark/protocol.h"
 #include "brin_benchmark/run_jobs.h"
@@ -19,14 +20,6 @@ namespace knav {
 namespace {
 
 constexpr double kTourSpacing_m = 4.0;
-
-nlohmann::json read_json(const std::string& path) {
-  try {
-    return nlohmann::json::parse(read_text_file(path));
-  } catch (const nlohmann::json::exception& error) {
-    throw UserError(path + ": " + error.what());
-  }
-}
 
 /// What two sessions must share to go on with each other's files.
 nlohmann::json identity(const GoalSessionOptions& o) {
@@ -73,20 +66,7 @@ GoalSession::GoalSession(const GoalSessionOptions& options) : options_(options) 
   if (options_.run < 0 || options_.run > options_.suite.runs) {
     throw UserError(fmt::format("--run {}: there are {} runs.", options_.run, options_.suite.runs));
   }
-  std::error_code failed;
-  fs::create_directories(options_.out, failed);
-  if (failed) throw UserError(options_.out + ": cannot be made: " + failed.message() + ".");
-  const std::string setup_file = options_.out + "/setup.json";
-  const nlohmann::json now = identity(options_);
-  if (!fs::exists(setup_file)) {
-    write_text_atomically(setup_file, now.dump(1) + "\n");
-    return;
-  }
-  const nlohmann::json before = read_json(setup_file);
-  for (const auto& [key, value] : now.items()) {
-    if (before.value(key, nlohmann::json()) == value) continue;
-    throw UserError(fmt::format("{}: holds goals with another '{}'; choose another folder, or remove it.", options_.out, key));
-  }
+  claim_folder(options_.out, identity(options_), "goals");
 }
 
 std::string GoalSession::stem(std::size_t run) const { return fmt::format("{}/run_{:02}", options_.out, run + 1); }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "brin_benchmark/benchmark_folder.h"
 #include "brin_benchmark/benchmark_report.h"
 #include "brin_benchmark/run_jobs.h"
 #include "core/config.h"
@@ -17,14 +18,6 @@ namespace fs = std::filesystem;
 
 namespace knav {
 namespace {
-
-nlohmann::json read_json(const std::string& path) {
-  try {
-    return nlohmann::json::parse(read_text_file(path));
-  } catch (const nlohmann::json::exception& error) {
-    throw UserError(path + ": " + error.what());
-  }
-}
 
 nlohmann::json pose_json(const Pose2& pose) { return {pose.x_m, pose.y_m, pose.yaw_rad}; }
 Pose2 pose_from(const nlohmann::json& json) { return {json.at(0), json.at(1), json.at(2)}; }
@@ -98,21 +91,7 @@ BenchmarkSession::BenchmarkSession(const SessionOptions& options) : options_(opt
   // Every run's building is read now: a fault in the last one should not show after an hour.
   for (const BenchmarkRun& run : protocol_.runs) changed_world(options.world, protocol_, run);
 
-  std::error_code failed;
-  fs::create_directories(options.out, failed);
-  if (failed) throw UserError(options.out + ": cannot be made: " + failed.message() + ".");
-  const std::string setup_file = options.out + "/setup.json";
-  const nlohmann::json now = identity(options);
-  if (!fs::exists(setup_file)) {
-    write_text_atomically(setup_file, now.dump(1) + "\n");
-    return;
-  }
-  const nlohmann::json before = read_json(setup_file);
-  for (const auto& [key, value] : now.items()) {
-    if (before.value(key, nlohmann::json()) == value) continue;
-    throw UserError(fmt::format(
-        "{}: holds a benchmark with another '{}'; choose another folder, or remove it.", options.out, key));
-  }
+  claim_folder(options.out, identity(options), "a benchmark");
 }
 
 std::string BenchmarkSession::stem(std::size_t run) const {

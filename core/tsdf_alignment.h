@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "core/cost_field.h"
 #include "core/particle_filter.h"
 #include "core/tsdf_grid.h"
+#include "core/weighted_points.h"
 
 namespace knav {
 

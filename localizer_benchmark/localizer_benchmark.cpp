@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstdlib>
 
 #include "core/error.h"
 #include "core/file_io.h"
 #include "localizer_benchmark/rows.h"
 #include "ros_common/command_line.h"
+#include "tools/simulated_recordings.h"
 
 namespace knav {
 namespace {
@@ -117,11 +117,6 @@ void benchmark(Options options) {
     }
   }
   if (options.json == "-") write_json(options.json, json.dump(1));
-}
-
-std::string default_cache() {
-  const char* home = std::getenv("HOME");
-  return std::string(home ? home : ".") + "/.cache/kinect_nav";
 }
 
 }  // namespace

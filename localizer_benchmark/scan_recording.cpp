@@ -4,13 +4,13 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <type_traits>
 
 #include "core/error.h"
 #include "core/file_io.h"
 #include "core/progress.h"
 #include "depth_profile_nodelet/profile_extractor.h"
 #include "ros_common/program.h"
+#include "tools/binary_io.h"
 #include "tsdf_local_mapper/local_mapper.h"
 
 namespace knav {
@@ -20,32 +20,6 @@ constexpr char kMagic[8] = {'k', 'n', 'a', 'v', 's', 'c', 'a', '1'};
 constexpr double kStep_m = 0.0005;
 constexpr std::uint16_t kUnknown = 65535, kFree = 65534;
 constexpr double kOutAfter_s = 1.0 / 60.0;  // the image is out half a readout after its stamp
-
-template <class T>
-void write(std::ostream& out, const T& value) {
-  static_assert(std::is_trivially_copyable_v<T>);
-  out.write(reinterpret_cast<const char*>(&value), sizeof value);
-}
-template <class T>
-void write(std::ostream& out, const std::vector<T>& values) {
-  write(out, static_cast<std::uint64_t>(values.size()));
-  out.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
-}
-template <class T>
-void read(std::istream& in, T* value) {
-  in.read(reinterpret_cast<char*>(value), sizeof *value);
-}
-template <class T>
-void read(std::istream& in, std::vector<T>* values) {
-  std::uint64_t count = 0;
-  read(in, &count);
-  if (!in || count > (std::uint64_t{1} << 33) / sizeof(T)) {
-    in.setstate(std::ios::failbit);
-    return;
-  }
-  values->resize(count);
-  in.read(reinterpret_cast<char*>(values->data()), static_cast<std::streamsize>(count * sizeof(T)));
-}
 
 std::uint16_t packed(float range_m) {
   if (std::isnan(range_m)) return kUnknown;

@@ -86,7 +86,7 @@ struct TrackingConfig {
   double horizon_s = 1.5;
   double min_in_place_vel_theta = 0.15;
   double stop_decel_mps2 = 1.0;
-  double moving_mps = 0.25;
+  double moving_mps = 3.0;
   double moving_distance_m = 0.8;
 
   template <class Visitor>
@@ -101,7 +101,7 @@ struct TrackingConfig {
     v.number("horizon_s", horizon_s, 0.3, 5, "s", "Rollouts look this far ahead.");
     v.number("min_in_place_vel_theta", min_in_place_vel_theta, 0, 1, "rad/s", "Slowest turn in place.");
     v.number("stop_decel_mps2", stop_decel_mps2, 0.1, 10, "m/s^2", "Braking when something is in the way.");
-    v.number("moving_mps", moving_mps, 0.02, 3, "m/s", "Speed right beside what moves or has just appeared; max_vel_x ...");
+    v.number("moving_mps", moving_mps, 0.02, 3, "m/s", "Speed right beside what moves or has just appeared (max_vel_x or more: no slower for it); max_vel_x ...");
     v.number("moving_distance_m", moving_distance_m, 0.05, 5, "m", "... is allowed this far from it.");
   }
 };

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -187,11 +186,6 @@ void benchmark(const Options& options) {
     }
   }
   write_json(options.json, json.dump(2));
-}
-
-std::string default_cache() {
-  const char* home = std::getenv("HOME");
-  return std::string(home ? home : ".") + "/.cache/kinect_nav";
 }
 
 }  // namespace

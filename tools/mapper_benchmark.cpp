@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
@@ -216,11 +215,6 @@ void benchmark(const Options& options) {
         {"world", row.world}, {"sensor", row.sensor}, {"seeds", seeds}, {"runs", runs}, {"mean", mean}};
   }
   if (!options.record_only) write_json(options.json, json.dump(2));
-}
-
-std::string default_cache() {
-  const char* home = std::getenv("HOME");
-  return std::string(home ? home : ".") + "/.cache/kinect_nav";
 }
 
 }  // namespace

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <type_traits>
 
 #include "core/error.h"
 #include "core/file_io.h"
+#include "tools/binary_io.h"
 
 namespace knav {
 namespace {
@@ -22,34 +22,6 @@ std::uint16_t packed(float metres) {
   return steps < static_cast<float>(kNothing) ? static_cast<std::uint16_t>(steps) : kNothing;
 }
 float unpacked(std::uint16_t steps) { return steps == kNothing ? kNaN : static_cast<float>(steps) * kStep_m; }
-
-template <class T>
-void write(std::ostream& out, const T& value) {
-  static_assert(std::is_trivially_copyable_v<T>);
-  out.write(reinterpret_cast<const char*>(&value), sizeof value);
-}
-template <class T>
-void write(std::ostream& out, const std::vector<T>& values) {
-  static_assert(std::is_trivially_copyable_v<T>);
-  write(out, static_cast<std::uint64_t>(values.size()));
-  out.write(reinterpret_cast<const char*>(values.data()),
-            static_cast<std::streamsize>(values.size() * sizeof(T)));
-}
-template <class T>
-void read(std::istream& in, T* value) {
-  in.read(reinterpret_cast<char*>(value), sizeof *value);
-}
-template <class T>
-void read(std::istream& in, std::vector<T>* values) {
-  std::uint64_t count = 0;
-  read(in, &count);
-  if (!in || count > (std::uint64_t{1} << 33) / sizeof(T)) {
-    in.setstate(std::ios::failbit);
-    return;
-  }
-  values->resize(count);
-  in.read(reinterpret_cast<char*>(values->data()), static_cast<std::streamsize>(count * sizeof(T)));
-}
 
 }  // namespace
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
 
@@ -88,6 +89,11 @@ ProfileRecording simulate(const SimulatedDrive& drive) {
 }
 
 }  // namespace
+
+std::string default_cache() {
+  const char* home = std::getenv("HOME");
+  return std::string(home ? home : ".") + "/.cache/kinect_nav";
+}
 
 SimulatedRecordings::SimulatedRecordings(std::string folder, bool fresh)
     : folder_(std::move(folder)), fresh_(fresh) {

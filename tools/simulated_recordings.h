@@ -17,6 +17,9 @@ struct SimulatedDrive {
   FrontEndConfig front_end;
 };
 
+/// Where benchmarks keep what they simulated: ~/.cache/kinect_nav.
+std::string default_cache();
+
 /// Recordings of simulated drives in a folder: simulating a minute of depth frames takes longer than a minute
 /// of mapping by two orders, so it is done once per drive.
 class SimulatedRecordings {

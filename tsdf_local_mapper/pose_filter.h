@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/cost_field.h"
 #include "core/motion_model.h"
 #include "core/particle_filter.h"
 #include "core/tsdf_grid.h"
+#include "core/weighted_points.h"
 #include "tsdf_local_mapper/local_mapper_config.h"
 #include "tsdf_local_mapper/steady_errors.h"
 

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/cost_field.h"
 #include "core/grid_geometry.h"
 #include "core/particle_filter.h"
+#include "core/weighted_points.h"
 
 namespace knav {
 

@@ -96,6 +96,7 @@ void align(benchmark::State& state) {
 }
 BENCHMARK(align)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond)->Apply(shortest);
 
+#ifdef KNAV_HAVE_AVX2_CODE
 /// Particles within spread_m of the middle of a 1,024 x 1,024 grid of 5 cm, 120 readings up to 12 m away.
 struct Crowd {
   Crowd(std::size_t count, double spread_m) {
@@ -109,13 +110,12 @@ struct Crowd {
       const double angle = 0.05 * k, range_m = random.uniform(1.0, 12.0);
       points.add(static_cast<float>(range_m * std::cos(angle)), static_cast<float>(range_m * std::sin(angle)), 1.0f);
     }
-    for (int iy = 0; iy < 1024; ++iy) {
-      for (int ix = 0; ix < 1024; ++ix) field.set(ix, iy, random.uniform());
-    }
+    for (std::uint32_t& word : words) word = static_cast<std::uint32_t>(random.uniform() * 4294967295.0);
   }
   ParticleSet particles;
   WeightedPoints points;
-  CostField field{GridGeometry{1024, 1024, 0.05, -25.6, -25.6}, 1.0};
+  GridGeometry geometry{1024, 1024, 0.05, -25.6, -25.6};
+  std::vector<std::uint32_t> words = std::vector<std::uint32_t>(1024 * 1024);
 };
 
 void per_reading(benchmark::State& state, std::size_t count) {
@@ -125,12 +125,6 @@ void per_reading(benchmark::State& state, std::size_t count) {
 }
 
 /// Arguments: particles, spread in centimetres.
-void cost_field(benchmark::State& state, bool interpolate) {
-  const Crowd crowd(static_cast<std::size_t>(state.range(0)), 0.01 * static_cast<double>(state.range(1)));
-  std::vector<float> cost;
-  for (auto _ : state) alignment_costs(crowd.field, crowd.points, crowd.particles, interpolate, &cost);
-  per_reading(state, crowd.particles.size());
-}
 void crowds(benchmark::internal::Benchmark* b) {
   for (const int spread_cm : {20, 1000}) {
     for (const int count : {2000, 10000, 50000}) b->Args({count, spread_cm});
@@ -138,10 +132,7 @@ void crowds(benchmark::internal::Benchmark* b) {
   b->Unit(benchmark::kMicrosecond);
   shortest(b);
 }
-BENCHMARK_CAPTURE(cost_field, nearest, false)->Apply(crowds);
-BENCHMARK_CAPTURE(cost_field, bilinear, true)->Apply(crowds);
 
-#ifdef KNAV_HAVE_AVX2_CODE
 KNAV_AVX2 int sum_at(const std::uint32_t* quads, const std::vector<int>& index) {
   __m256i sum = _mm256_setzero_si256();
   for (std::size_t k = 0; k + 8 <= index.size(); k += 8) {
@@ -158,10 +149,10 @@ void bare_gather(benchmark::State& state) {
     const Pose2 T = crowd.particles.pose(i);
     for (std::size_t k = 0; k < crowd.points.size(); ++k) {
       const Point2 p = T * Point2{crowd.points.x_m[k], crowd.points.y_m[k]};
-      index.push_back(crowd.field.geometry().cell_y(p.y_m) * 1024 + crowd.field.geometry().cell_x(p.x_m));
+      index.push_back(crowd.geometry.cell_y(p.y_m) * 1024 + crowd.geometry.cell_x(p.x_m));
     }
   }
-  for (auto _ : state) benchmark::DoNotOptimize(sum_at(crowd.field.quads(), index));
+  for (auto _ : state) benchmark::DoNotOptimize(sum_at(crowd.words.data(), index));
   per_reading(state, crowd.particles.size());
 }
 BENCHMARK(bare_gather)->Apply(crowds);

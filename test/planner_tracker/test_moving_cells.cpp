@@ -66,7 +66,9 @@ TEST(MovingCells, WhatIsPutDownCountsForASecond) {
 TEST(MovingCells, TheRobotSlowsBesideSomebodyWhoWalksPastAndNotBesideWhatStands) {
   for (const bool walks : {true, false}) {
     const OccupancyGrid grid = room(14.0, 4.0);
-    ToyWorld world(grid, grid, {1.0, 1.2, 0.0});
+    PlannerTrackerConfig config;
+    config.tracking.moving_mps = 0.25;
+    ToyWorld world(grid, grid, {1.0, 1.2, 0.0}, config);
     const double began_s = world.now_s;
     // 0.85 m off the line, 0.4 m from the robot as it passes: nothing to slow for, if it stands.
     world.discs.push_back({[=](double t) { return Point2{walks ? 12.0 - 0.8 * (t - began_s) : 6.0, 2.05}; }, 0.25});
