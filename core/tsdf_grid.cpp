@@ -172,6 +172,8 @@ TsdfGrid::TsdfGrid(const TsdfConfig& config, double half_size_m, bool vectors) :
   rules_.standing_clear_to_m = static_cast<float>(config.low_clear_range_m);
   rules_.front_clear_to_m = static_cast<float>(config.front_clear_range_m);
   rules_.appear_to_m = static_cast<float>(config.appear_range_m);
+  rules_.low_appear_to_m =
+      config.appear_range_m > 0.0 ? std::max(rules_.appear_to_m, rules_.standing_clear_to_m) : 0.0f;
   rules_.vectors = vectors;
   weighted_sum_.resize(count);
   weight_.resize(count);

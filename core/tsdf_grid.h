@@ -43,7 +43,8 @@ struct TsdfConfig {
              "a wall); 0 = never.");
     v.number("appear_range_m", appear_range_m, 0, 20, "m",
              "Up to here a surface in cells known to be free counts at once, as its going does: before it is too near "
-             "for the camera to see it; 0 = never.");
+             "for the camera to see it. A low one up to low_clear_range_m, as from farther away it could not be seen. 0 = "
+             "never.");
   }
   std::vector<std::string> validate() const { return {}; }
   /// The largest weight one observation adds to a cell, in integer units.
@@ -126,6 +127,10 @@ class TsdfGrid {
   std::int8_t value(int ix, int iy) const { return value_[index(ix, iy)]; }
   /// What of weight_units() surfaces of low or high things gave.
   std::int32_t standing_weight_units(int ix, int iy) const { return standing_weight_[index(ix, iy)]; }
+  /// See is_standing().
+  bool standing(int ix, int iy) const {
+    return is_standing(standing_weight_units(ix, iy), weight_units(ix, iy), weight_unit_);
+  }
   float weight_unit() const { return weight_unit_; }
   const std::int32_t* weighted_sums() const { return weighted_sum_.data(); }
   const std::int32_t* weights() const { return weight_.data(); }

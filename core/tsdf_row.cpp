@@ -12,8 +12,9 @@ namespace {
 
 constexpr std::int8_t kSupport = 76;        ///< 0.6: cells below this have a surface near
 constexpr std::int8_t kFrontContrast = 76;  ///< by this much a cell must be freer than it was known to be
-/// A reading's own surface: not its hidden side, where a wall may end whose other face is seen from another room.
-constexpr float kOwnBehind = -0.2f, kOwnFront = 0.3f;
+/// A reading's own surface: not its hidden side, where a wall may end whose other face is seen from another room. A low
+/// thing that is seen along its edge shows itself at sharp angles only, so that its inside has to count.
+constexpr float kOwnBehind = -0.2f, kOwnBehindLow = -0.75f, kOwnFront = 0.3f;
 
 std::int8_t value_of(std::int32_t weighted_sum, std::int32_t weight) {
   if (weight <= 0) return TsdfGrid::kUnknown;
@@ -65,9 +66,13 @@ inline bool contradicts(const TsdfRules& rules, const TsdfObservation& o, std::s
 }
 
 /// Whether the observation shows a surface in a cell that was known to be free. Near the robot that must count at once:
-/// closer still, a depth camera sees nothing of it, and what the map did not take in by then would be driven into.
-inline bool appears(const TsdfRules& rules, float d, const Part& part, std::int8_t held) {
-  return part.near_surface && d <= rules.appear_to_m && part.f >= kOwnBehind && part.f <= kOwnFront &&
+/// closer still, a depth camera sees nothing of it, and what the map did not take in by then would be driven into. That
+/// holds from farther away for low things: from where the cell was called free, they could not be seen.
+inline bool appears(const TsdfRules& rules, const TsdfObservation& o, std::size_t u, float d, const Part& part,
+                    std::int8_t held) {
+  const bool low = o.standing[u] != 0;
+  return part.near_surface && d <= (low ? rules.low_appear_to_m : rules.appear_to_m) &&
+         part.f >= (low ? kOwnBehindLow : kOwnBehind) && part.f <= kOwnFront &&
          held != TsdfGrid::kUnknown &&
          static_cast<float>(held) - TsdfGrid::kValueScale * part.f > static_cast<float>(kFrontContrast);
 }
@@ -79,9 +84,9 @@ inline void add_to_cell(const TsdfRules& rules, const TsdfObservation& o, const 
   const auto u = static_cast<std::size_t>(column[k]);
   const float d = distance_m[k];
   const Part part = part_of(rules, o, u, d);
-  const bool standing = 4 * static_cast<std::int64_t>(cells.standing_weight[k]) >= cells.weight[k];
+  const bool standing = is_standing(cells.standing_weight[k], cells.weight[k], rules.weight_unit);
   const std::int8_t held = cells.value[k];
-  if (contradicts(rules, o, u, d, part, held, standing) || appears(rules, d, part, held)) {
+  if (contradicts(rules, o, u, d, part, held, standing) || appears(rules, o, u, d, part, held)) {
     if (++cells.contradictions[k] >= rules.contradictions_to_reset) {
       cells.weighted_sum[k] = cells.weight[k] = cells.standing_weight[k] = 0;
       cells.reset[k] = o.sequence;
@@ -203,6 +208,7 @@ KNAV_AVX2 int add_to_cells_avx2(const TsdfRules& rules, const TsdfObservation& o
                                 const float* distance_m, int count, const TsdfCells& cells,
                                 TsdfChange* change, std::uint64_t* contradicted) {
   const __m256 age = _mm256_set1_ps(o.age_clock_s);
+  const float appear_to_m = o.any_standing ? rules.low_appear_to_m : rules.appear_to_m;
   int k = 0;
   for (; k + 8 <= count; k += 8) {
     const __m256i u = load8(column + k);
@@ -226,7 +232,7 @@ KNAV_AVX2 int add_to_cells_avx2(const TsdfRules& rules, const TsdfObservation& o
     const __m256i freer = _mm256_castps_si256(
         _mm256_cmp_ps(contrast, _mm256_set1_ps(-static_cast<float>(kFrontContrast)), _CMP_LT_OQ));
     const __m256i near_enough =
-        _mm256_castps_si256(_mm256_cmp_ps(d, _mm256_set1_ps(rules.appear_to_m), _CMP_LE_OQ));
+        _mm256_castps_si256(_mm256_cmp_ps(d, _mm256_set1_ps(appear_to_m), _CMP_LE_OQ));
     const __m256i come =
         _mm256_and_si256(_mm256_and_si256(freer, near_enough), _mm256_and_si256(part.near_surface, seen));
     const __m256i doubtful = _mm256_or_si256(gone, come);

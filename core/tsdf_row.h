@@ -27,8 +27,16 @@ struct TsdfRules {
   float standing_clear_to_m = 0.0f;  ///< beyond this a low thing is no longer seen
   float front_clear_to_m = 0.0f;     ///< see TsdfConfig::front_clear_range_m
   float appear_to_m = 0.0f;          ///< see TsdfConfig::appear_range_m
+  float low_appear_to_m = 0.0f;      ///< the same for low things, at least appear_to_m
   bool vectors = true;
 };
+
+/// Whether what a cell holds is taken for a low or high thing, which leaves the view as one comes near: a quarter of its
+/// weight comes from such readings, or as much as eight of them give from 2 m off. Somebody who walks past a box on the
+/// floor, or stands before it, does not take it with him.
+inline bool is_standing(std::int32_t standing_weight, std::int32_t weight, float weight_unit) {
+  return 4 * static_cast<std::int64_t>(standing_weight) >= weight || static_cast<float>(standing_weight) >= 2.0f * weight_unit;
+}
 
 /// Which cells changed their value: a range, or none.
 struct TsdfChange {

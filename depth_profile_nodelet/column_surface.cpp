@@ -13,6 +13,9 @@ constexpr float kInf = std::numeric_limits<float>::infinity();
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr int kKept = 8;  // smallest readings remembered per column
 constexpr int kRounds = 4;
+/// From about 20 m on a Kinect's disparity saturates and answers with anything, also with 15 m, block of rows by block of
+/// rows. A surface farther than this must show so much height, in more rows than the column has beyond its range.
+constexpr float kDoubtful_m = 10.0f, kDoubtfulHeight_m = 0.6f;
 // Near the camera noise is millimetres, but surfaces slant and a tilted camera's levelled distance has more
 // noise.
 constexpr float kSmallestWindow_m = 0.015f;
@@ -60,13 +63,15 @@ void smallest_of_strip(const float* z_m, std::size_t stride, int rows, const flo
 }
 
 KNAV_MULTIVERSION
-void sum_row(const float* z_m, int width, const float* from_m, const float* to_m, float* sum, float* count) {
+void sum_row(const float* z_m, int width, const float* from_m, const float* to_m, float range_max_m,
+             float* sum, float* count, float* beyond) {
 #pragma GCC ivdep
   for (int u = 0; u < width; ++u) {
     const float z = z_m[u];
     const bool in = (z >= from_m[u]) & (z <= to_m[u]);
     sum[u] += in ? 1.0f / z : 0.0f;
     count[u] += in ? 1.0f : 0.0f;
+    beyond[u] += z > range_max_m ? 1.0f : 0.0f;
   }
 }
 
@@ -83,12 +88,32 @@ void ColumnSurface::configure(int support_rows, double window_per_m, double rang
   range_max_m_ = static_cast<float>(range_max_m);
 }
 
-void ColumnSurface::find(const cv::Mat& sliced) {
+void ColumnSurface::find(const cv::Mat& sliced, double fy_px) {
   const auto width = static_cast<std::size_t>(sliced.cols);
   nearest_m_.assign(width, kNaN);
   window_end_m_.assign(width, kNaN);
   for (int first = 0; first < sliced.cols; first += kStrip) find_in_strip(sliced, first);
   for (std::size_t u = 0; u < width; ++u) window_end_m_[u] = window_end(nearest_m_[u]);
+  sum_windows(sliced);
+  drop_doubtful(static_cast<float>(fy_px));
+}
+
+void ColumnSurface::sum_windows(const cv::Mat& sliced) {
+  const auto width = static_cast<std::size_t>(sliced.cols);
+  for (auto* sums : {&sum_, &count_, &beyond_}) sums->assign(width, 0.0f);
+  for (int v = 0; v < sliced.rows; ++v) {
+    sum_row(sliced.ptr<float>(v), sliced.cols, nearest_m_.data(), window_end_m_.data(), range_max_m_, sum_.data(),
+            count_.data(), beyond_.data());
+  }
+}
+
+void ColumnSurface::drop_doubtful(float fy_px) {
+  for (std::size_t u = 0; u < nearest_m_.size(); ++u) {
+    const float z_m = count_[u] / sum_[u];
+    if (!(z_m > kDoubtful_m) || (count_[u] >= beyond_[u] && count_[u] * z_m >= fy_px * kDoubtfulHeight_m)) continue;
+    nearest_m_[u] = window_end_m_[u] = kNaN;
+    count_[u] = 0.0f;
+  }
 }
 
 void ColumnSurface::find_in_strip(const cv::Mat& sliced, int first_column) {
@@ -146,16 +171,9 @@ float ColumnSurface::first_supported(const float* sorted) const {
   return kNaN;
 }
 
-void ColumnSurface::average(const cv::Mat& sliced, std::vector<float>* z_m) {
-  const auto width = static_cast<std::size_t>(sliced.cols);
-  sum_.assign(width, 0.0f);
-  count_.assign(width, 0.0f);
-  for (int v = 0; v < sliced.rows; ++v) {
-    sum_row(sliced.ptr<float>(v), sliced.cols, nearest_m_.data(), window_end_m_.data(), sum_.data(),
-            count_.data());
-  }
-  z_m->resize(width);
-  for (std::size_t u = 0; u < width; ++u) (*z_m)[u] = count_[u] > 0.0f ? count_[u] / sum_[u] : kNaN;
+void ColumnSurface::average(std::vector<float>* z_m) const {
+  z_m->resize(count_.size());
+  for (std::size_t u = 0; u < count_.size(); ++u) (*z_m)[u] = count_[u] > 0.0f ? count_[u] / sum_[u] : kNaN;
 }
 
 void ColumnSurface::minimum(const cv::Mat& sliced, double range_max_m, std::vector<float>* z_m) {

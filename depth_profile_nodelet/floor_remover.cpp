@@ -227,7 +227,7 @@ void FloorRemover::conclude(const PinholeModel& camera, const FloorPlane& plane,
   result->free_from_m.assign(width, kNaN);
   result->free_to_m.assign(width, kNaN);
   result->height_class.assign(width, HeightClass::kNone);
-  surface_.find(sliced);
+  surface_.find(sliced, camera.fy_px);
   classify(camera, plane, sliced);
   const std::vector<float>& nearest_m = surface_.nearest_m();
   const auto floor_range_m = static_cast<float>(config_.floor_range_m);

@@ -33,9 +33,9 @@ void ProfileExtractor::extract(const cv::Mat& sliced, const PinholeModel& camera
     if (found && found->finds_the_same(surface_)) {
       surface_.take(*found);
     } else {
-      surface_.find(sliced);
+      surface_.find(sliced, camera.fy_px);
     }
-    surface_.average(sliced, &profile->z_m);
+    surface_.average(&profile->z_m);
   }
   smooth(&profile->z_m);
 

@@ -60,10 +60,11 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s) {
   const bool first = held_since_s_ < 0.0;
   if (first) held_ = path_;
   held_.advance(robot);
-  const bool detour = result_.cost_m > held_.remaining_m() + config_.planning.hold_detour_m;
-  if (held_.empty() || held_.offset_m() > kOffPath_m || !detour) return false;
+  const double detour_m = result_.cost_m - held_.remaining_m();
+  if (held_.empty() || held_.offset_m() > kOffPath_m || detour_m < config_.planning.hold_detour_m) return false;
   if (first) held_since_s_ = now_s;
-  if (now_s - held_since_s_ > config_.planning.hold_s) return false;
+  const double worth_s = config_.planning.hold_share * detour_m / config_.max_vel_x;
+  if (now_s - held_since_s_ > std::max(config_.planning.hold_s, worth_s)) return false;
   std::vector<Point2> way;
   held_.rest(&way);
   if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), &way)) return false;

@@ -37,6 +37,7 @@ struct PlanningConfig {
   double switch_gain_m = 0.30;
   double hold_s = 4.0;
   double hold_detour_m = 2.0;
+  double hold_share = 0.15;
   double controller_patience = 3.0;
   double blocked_timeout_s = 40.0;
   double look_distance_m = 1.8;
@@ -55,6 +56,8 @@ struct PlanningConfig {
     v.number("hold_s", hold_s, 0, 60, "s",
              "A way that has just been closed is kept for this long, as whoever walks there walks on, if the way round is longer ...");
     v.number("hold_detour_m", hold_detour_m, 0, 100, "m", "... by more than this.");
+    v.number("hold_share", hold_share, 0, 1, "",
+             "It is kept longer, for this share of what the way round takes longer at full speed.");
     v.number("controller_patience", controller_patience, 0.1, 60, "s",
              "The robot waits this long before something in its way, replanning, before it tries reactive "
              "avoidance.");

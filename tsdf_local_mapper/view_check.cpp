@@ -15,11 +15,16 @@ void ViewCheck::update(const TsdfGrid& grid, const TsdfObservation& o, const Pos
   const std::size_t stride = std::max<std::size_t>(1, o.columns() / kRays);
   int known = 0, agree = 0, through = 0;
   for (std::size_t i = stride / 2; i < o.columns(); i += stride) {
-    if (std::isnan(o.range_m[i])) continue;
+    if (std::isnan(o.range_m[i]) || o.standing[i] != 0) continue;
     const double x = o.direction_x[i], y = o.direction_y[i];
-    const RayEnd end = cast_ray(grid, contour_, T_map_sensor.x_m, T_map_sensor.y_m, c * x - s * y,
-                                s * x + c * y, range_max_m_);
+    const double map_x = c * x - s * y, map_y = s * x + c * y;
+    const RayEnd end =
+        cast_ray(grid, contour_, T_map_sensor.x_m, T_map_sensor.y_m, map_x, map_y, range_max_m_);
     if (end.kind != RayEnd::Kind::kSurface) continue;
+    // A low box right before the camera is out of its view, and what is seen instead lies behind it.
+    const int ix = grid.cell_of(T_map_sensor.x_m + map_x * end.range_m);
+    const int iy = grid.cell_of(T_map_sensor.y_m + map_y * end.range_m);
+    if (grid.contains(ix, iy) && grid.standing(ix, iy)) continue;
     ++known;
     const double tolerance_m = std::max(0.25, 0.75 * static_cast<double>(o.truncation_m[i]));
     const double difference_m = o.range_m[i] - end.range_m;

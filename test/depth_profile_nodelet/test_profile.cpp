@@ -55,6 +55,27 @@ TEST(DepthProfile, HasNoBiasTowardsTheCameraUnderCorrelatedNoise) {
   }
 }
 
+TEST(DepthProfile, WhatLiesBeyondSaturationIsNotSeenInTheNearestOfItsReadings) {
+  // Twelve blocks of seven rows, as disparity is matched, each with one answer: 26 m, or some codes nearer, three in ten nearer
+  // than 20 m. And the same with a cupboard at 14 m in the lower half.
+  cv::Mat open(480, 640, CV_32FC1, cv::Scalar(kNaN));
+  for (int v = 160; v < 244; ++v) {
+    RandomStream random(7, random_stream::kTest, 0, static_cast<std::uint32_t>(v / 7));
+    for (int u = 0; u < 640; ++u) {
+      const double codes = 4.0 * std::fabs(random.normal());
+      open.at<float>(v, u) = static_cast<float>(1.0 / (1.0 / 26.0 + codes * kInverseDepthPerCode));
+    }
+  }
+  int readings = 0;
+  for (const float z : extract(open).z_m) readings += std::isnan(z) ? 0 : 1;
+  EXPECT_LE(readings, 64);  // of 640 columns; nearly all had one before
+  cv::Mat cupboard = open.clone();
+  cupboard.rowRange(200, 244).setTo(14.0f);
+  int seen = 0;
+  for (const float z : extract(cupboard).z_m) seen += std::fabs(z - 14.0f) < 0.7f ? 1 : 0;
+  EXPECT_GE(seen, 600);
+}
+
 TEST(DepthProfile, StraysDoNotHideTheWallBehindThem) {
   cv::Mat sliced(480, 640, CV_32FC1, cv::Scalar(kNaN));
   sliced.rowRange(100, 300).setTo(3.0f);
