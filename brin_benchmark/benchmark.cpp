@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "brin_benchmark/closed_loop.h"
 #include "brin_benchmark/ticker.h"
 #include "core/error.h"
 
@@ -32,37 +31,37 @@ double seconds_since(Clock::time_point start) {
 }
 
 /// @param poll  called every simulated second; may throw to stop
-Leg drive_leg(ClosedLoop& loop, const Waypoint& waypoint, const std::function<void()>& poll,
+Leg drive_leg(BenchmarkRobot& robot, const Waypoint& waypoint, const std::function<void()>& poll,
               const std::function<void()>& collided) {
   Leg leg;
   leg.waypoint = waypoint.name;
-  const double start_s = loop.now_s(), start_m = loop.simulator().distance_driven_m();
-  const double limit_s = time_limit_s(distance_m(loop.simulator().T_world_base(), waypoint.T_world_robot));
-  if (!loop.stack().set_goal(waypoint.T_map_robot)) {
-    leg.reason = loop.stack().failure().reason;
+  const double start_s = robot.now_s(), start_m = robot.simulator().distance_driven_m();
+  const double limit_s = time_limit_s(distance_m(robot.simulator().T_world_base(), waypoint.T_world_robot));
+  if (!robot.set_goal(waypoint.T_map_robot)) {
+    leg.reason = robot.failure();
   } else {
     Ticker polling(1.0);
     while (true) {
-      if (polling.due(loop.now_s())) poll();
-      const std::uint32_t collisions = loop.simulator().contacts().collisions;
-      const Command& command = loop.step();
-      if (loop.simulator().contacts().collisions > collisions) collided();
-      if (command.finished) {
-        leg.reached = command.activity == Activity::kReached;
-        if (!leg.reached) leg.reason = loop.stack().failure().reason;
+      if (polling.due(robot.now_s())) poll();
+      const std::uint32_t collisions = robot.simulator().contacts().collisions;
+      const GoalState state = robot.step();
+      if (robot.simulator().contacts().collisions > collisions) collided();
+      if (state != GoalState::kDriving) {
+        leg.reached = state == GoalState::kReached;
+        if (!leg.reached) leg.reason = robot.failure();
         break;
       }
-      if (loop.now_s() - start_s > limit_s) {
+      if (robot.now_s() - start_s > limit_s) {
         leg.reason = fmt::format("not reached within {:.0f} s.", limit_s);
-        loop.stack().cancel();
+        robot.cancel();
         break;
       }
     }
   }
-  leg.time_s = loop.now_s() - start_s;
-  leg.distance_m = loop.simulator().distance_driven_m() - start_m;
+  leg.time_s = robot.now_s() - start_s;
+  leg.distance_m = robot.simulator().distance_driven_m() - start_m;
   if (leg.reached)
-    leg.positioning_error_m = distance_m(loop.simulator().T_world_base(), waypoint.T_world_robot);
+    leg.positioning_error_m = distance_m(robot.simulator().T_world_base(), waypoint.T_world_robot);
   return leg;
 }
 
@@ -131,43 +130,42 @@ BuiltMap map_world(const BenchmarkSetup& setup, std::vector<Waypoint>* waypoints
   return built;
 }
 
-RunRecord run_sequence(const BenchmarkSetup& setup, const WorldConfig& changed, const MapDirectory& map,
-                       const std::vector<Waypoint>& waypoints, const BenchmarkProgress& progress,
-                       FlightRecorder* recorder) {
+RunRecord run_sequence(BenchmarkRobot& robot, const Pose2& T_map_start, const std::vector<Waypoint>& waypoints,
+                       const BenchmarkProgress& progress, FlightRecorder* recorder) {
   RunRecord record;
   const auto wall_start = Clock::now();
-  ClosedLoop loop(setup.simulator, setup.stack, changed, map, recorder);
-  loop.record(&record.truth, &record.estimate);
-  loop.start(Pose2{});
+  robot.record(&record.truth, &record.estimate);
+  robot.start(T_map_start);
   RunResult& result = record.result;
-  const double start_s = loop.now_s();
+  const double start_s = robot.now_s();
   for (std::size_t i = 0; i < waypoints.size(); ++i) {
     const double fraction = static_cast<double>(i) / static_cast<double>(waypoints.size());
     const auto collided = [&] {
-      const Pose2& T_world_base = loop.simulator().T_world_base();
-      result.collisions_at.push_back({loop.now_s() - start_s, T_world_base.x_m, T_world_base.y_m});
+      const Pose2& T_world_base = robot.simulator().T_world_base();
+      result.collisions_at.push_back({robot.now_s() - start_s, T_world_base.x_m, T_world_base.y_m});
       if (recorder == nullptr) return;
       recorder->failure(fmt::format("{}_{}_collision_{}", i + 1, waypoints[i].name, result.collisions_at.size()),
                         fmt::format("The robot ran into something at ({:.2f}, {:.2f}) m of the world.", T_world_base.x_m,
                                     T_world_base.y_m));
     };
-    result.legs.push_back(drive_leg(loop, waypoints[i], [&] { progress("run", fraction); }, collided));
+    result.legs.push_back(drive_leg(robot, waypoints[i], [&] { progress("run", fraction); }, collided));
     const Leg& leg = result.legs.back();
     if (leg.reached) continue;
-    const Pose2& T_world_base = loop.simulator().T_world_base();
+    const Pose2& T_world_base = robot.simulator().T_world_base();
     record.failed_at.push_back({T_world_base.x_m, T_world_base.y_m});
     if (recorder != nullptr) recorder->failure(fmt::format("{}_{}", i + 1, leg.waypoint), leg.reason);
-    if (!loop.place_near(waypoints[i].T_world_robot, waypoints[i].T_map_robot)) {
+    if (!robot.place_near(waypoints[i].T_world_robot, waypoints[i].T_map_robot)) {
       throw UserError(fmt::format("no room for the robot within 2 m of waypoint '{}'.", waypoints[i].name));
     }
   }
   progress("run", 1.0);
-  result.time_s = loop.now_s() - start_s;
-  result.distance_m = loop.simulator().distance_driven_m();
-  result.collisions = loop.simulator().contacts().collisions;
-  result.walker_contacts = loop.simulator().contacts().walker_contacts;
+  result.time_s = robot.now_s() - start_s;
+  result.distance_m = robot.simulator().distance_driven_m();
+  result.collisions = robot.simulator().contacts().collisions;
+  result.walker_contacts = robot.simulator().contacts().walker_contacts;
   result.wall_s = seconds_since(wall_start);
-  result.frame_cost_ms = loop.frame_cost_ms();
+  result.frame_cost_ms = robot.frame_cost_ms();
+  result.frames_dropped = robot.frames_dropped();
   return record;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "brin_benchmark/benchmark_robot.h"
 #include "brin_benchmark/flight_recorder.h"
 #include "brin_benchmark/navigation_stack.h"
 #include "brin_benchmark/scoring.h"
@@ -46,11 +47,11 @@ using BenchmarkProgress = std::function<void(const std::string& stage, double fr
 BuiltMap map_world(const BenchmarkSetup& setup, std::vector<Waypoint>* waypoints,
                    const BenchmarkProgress& progress);
 
-/// Sends the robot through the waypoints in lock-step, in a building that may have changed. A leg not done in
-/// its time is a failure; the robot is then set down at that waypoint and goes on.
-/// @param recorder  told of what happens, may be null
-RunRecord run_sequence(const BenchmarkSetup& setup, const WorldConfig& changed, const MapDirectory& map,
-                       const std::vector<Waypoint>& waypoints, const BenchmarkProgress& progress,
-                       FlightRecorder* recorder = nullptr);
+/// Sends the robot through the waypoints. A leg not done in its time is a failure; the robot is then set down at that
+/// waypoint and goes on.
+/// @param T_map_start  where the robot stands as the run begins
+/// @param recorder     told of failures and collisions, may be null
+RunRecord run_sequence(BenchmarkRobot& robot, const Pose2& T_map_start, const std::vector<Waypoint>& waypoints,
+                       const BenchmarkProgress& progress, FlightRecorder* recorder = nullptr);
 
 }  // namespace knav

@@ -7,6 +7,8 @@
 namespace knav {
 namespace {
 
+constexpr double kFramesMissed = 0.005;  ///< a share of the depth frames that nobody misses
+
 nlohmann::json to_json(const Estimate& e) {
   return {{"mean", e.mean}, {"low_95", e.low}, {"high_95", e.high}};
 }
@@ -41,6 +43,7 @@ nlohmann::json to_json(const RunResult& run) {
           {"distance_m", run.distance_m},
           {"wall_s", run.wall_s},
           {"frame_cost_ms", run.frame_cost_ms},
+          {"frames_dropped", run.frames_dropped},
           {"legs", legs}};
 }
 
@@ -57,6 +60,7 @@ RunResult run_from_json(const nlohmann::json& json, const std::string& file) {
     run.distance_m = json.at("distance_m");
     run.wall_s = json.at("wall_s");
     run.frame_cost_ms = json.at("frame_cost_ms");
+    run.frames_dropped = json.value("frames_dropped", 0.0);
     for (const auto& entry : json.at("legs")) {
       Leg leg;
       leg.waypoint = entry.at("waypoint");
@@ -128,9 +132,15 @@ std::string report_markdown(const std::vector<RunResult>& runs, const std::vecto
   for (const RunResult& run : runs) {
     const Score one = score({run});
     text +=
-        fmt::format("| {} | {} | {} | {:.0f} m | {:.0f} s | {:.2f} m/s | {:.3f}, {:.3f} m | {:.1f} ms |\n",
+        fmt::format("| {} | {} | {} | {:.0f} m | {:.0f} s | {:.2f} m/s | {:.3f}, {:.3f} m | {} |\n",
                     run.name, one.failures, one.collisions, one.distance_m, one.time_s, one.average_speed_mps,
-                    one.positioning_error_mean_m, one.positioning_error_max_m, run.frame_cost_ms);
+                    one.positioning_error_mean_m, one.positioning_error_max_m,
+                    run.frame_cost_ms > 0.0 ? fmt::format("{:.1f} ms", run.frame_cost_ms) : "");
+  }
+  for (const RunResult& run : runs) {
+    if (run.frames_dropped <= kFramesMissed) continue;
+    text += fmt::format("\n{}: {:.1f} % of the depth frames came too late to be rendered; the machine was too slow.\n",
+                        run.name, 100.0 * run.frames_dropped);
   }
   bool heading = false;
   for (const RunResult& run : runs) {

@@ -1,6 +1,7 @@
 // brin_benchmark: maps a simulated building, sends the robot through its waypoints while the building
 // changes, and scores it as the paper did.
 #include <fmt/format.h>
+#include <ros/init.h>
 
 #include <ctime>
 #include <filesystem>
@@ -9,6 +10,8 @@
 
 #include "brin_benchmark/benchmark_report.h"
 #include "brin_benchmark/configurations.h"
+#include "brin_benchmark/external_benchmark.h"
+#include "brin_benchmark/external_command_line.h"
 #include "brin_benchmark/failure_bag.h"
 #include "brin_benchmark/session.h"
 #include "core/error.h"
@@ -25,7 +28,10 @@ What OUT has already is not driven again, so an interrupted benchmark goes on wh
 --run K (GNU parallel, Slurm) are put together by --merge.
 run_NN.json has collisions_at[]: time_s since the run began, x_m and y_m of the robot in the world. report.json: runs, legs, failures, collisions, walker_contacts (counts), time_s, distance_m, {mean,max}_time_to_failure_s,
 {mean,max}_distance_to_failure_m, average_speed_mps, positioning_error_{mean,sd,max}_m, the 95 % intervals of
-failures_per_run, speed_mps and positioning_error_m, and each run with its legs.)";
+failures_per_run, speed_mps and positioning_error_m, and each run with its legs.
+--config external starts simulator and scorer only, as a ROS node: it publishes /clock, odom, TF, the Kinect's images and
+camera_info, sends initialpose and the goals to move_base, and takes cmd_vel. First --map-only, which needs no master; then
+a master with /use_sim_time true and your stack on OUT/map/map.yaml; then the same command without --map-only.)";
 
 std::string processor() {
   std::ifstream file("/proc/cpuinfo");
@@ -59,7 +65,17 @@ void print_summary(const std::vector<RunResult>& runs, const std::string& out) {
       s.positioning_error_mean_m, s.positioning_error_sd_m, out);
 }
 
-void drive(const SessionOptions& options) {
+std::string how_driven(const SessionOptions& options, const ExternalOptions& external) {
+  if (!options.external) return fmt::format("config {}", options.config.empty() ? "default" : options.config);
+  std::string text = external.rate > 0.0 ? fmt::format("external stack at {} times real time", external.rate)
+                                         : std::string("external stack, as fast as it follows");
+  if (!external.wait_topic.empty()) text += ", waiting for " + external.wait_topic;
+  if (external.lidar) text += ", with LIDAR";
+  if (!options.goals.empty()) text += ", goals " + options.goals;
+  return text;
+}
+
+void drive(const SessionOptions& options, const ExternalOptions& external, bool map_only) {
   BenchmarkSession session(options);
   std::string stage;
   std::unique_ptr<Progress> bar;
@@ -72,14 +88,23 @@ void drive(const SessionOptions& options) {
     bar->update(fraction, note);
   };
   session.map(progress);
-  session.run([](const std::string& stem) { return std::make_unique<FailureBag>(stem); }, progress);
+  if (map_only) {
+    bar.reset();
+    if (options.external) fmt::print("{}", external_next_steps(options));
+    return;
+  }
+  if (options.external) {
+    // What the failure bags hold are the lock-step stack's insides.
+    session.run({}, progress, external_robots(external));
+  } else {
+    session.run([](const std::string& stem) { return std::make_unique<FailureBag>(stem); }, progress);
+  }
   bar.reset();
   const auto runs = session.results();
   write_report(options.out, runs,
                {fmt::format("{}, {}, version {}", today(), processor(), KINECT_NAV_VERSION),
                 fmt::format("world {}, changes {}", options.world, options.changes),
-                fmt::format("config {}, sensor {}, odometry {}, seed {}{}",
-                            options.config.empty() ? "default" : options.config, options.sensor,
+                fmt::format("{}, sensor {}, odometry {}, seed {}{}", how_driven(options, external), options.sensor,
                             options.odometry, options.seed, options.quick ? ", quick" : "")});
   print_summary(runs, options.out);
 }
@@ -106,6 +131,8 @@ int main(int argc, char** argv) {
       "reached in its\n"
       "time is a failure.");
   knav::SessionOptions options;
+  knav::ExternalOptions external;
+  bool map_only = false;
   std::vector<std::string> folders;
   auto* merging =
       app.add_option("--merge", folders, "put the runs in these folders together instead of driving");
@@ -113,7 +140,7 @@ int main(int argc, char** argv) {
                  "world of the mapping drive, e.g. config/worlds/brin_building.yaml");
   app.add_option("--changes", options.changes,
                  "sequence and changes of every run, e.g. config/worlds/brin_changes.yaml");
-  app.add_option("--config", options.config, "default, paper_full, paper_baseline, or a file")
+  app.add_option("--config", options.config, "default, paper_full, paper_baseline, external (another stack, as ROS nodes), or a file")
       ->default_str("default");
   app.add_option("--calibration", options.calibration, "depth calibration of the simulated Kinect");
   app.add_option("--sensor", options.sensor, "sensor preset of the simulator")->capture_default_str();
@@ -126,15 +153,21 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0, 1000000))
       ->capture_default_str();
   app.add_flag("--quick", options.quick, "one run, its first legs");
+  app.add_flag("--map-only", map_only, "makes map and waypoints, and no runs");
   app.add_option("--out", options.out, "folder for map, runs and report")->required();
+  const CLI::Option_group* group = knav::add_external_options(&app, &external, &options);
   app.footer(knav::kFooter);
+  // Takes ROS's own arguments (remappings) away; reaches for no master.
+  ros::init(argc, argv, "brin_benchmark", ros::init_options::NoSigintHandler);
   return knav::run_command(app, argc, argv, [&] {
     if (*merging) return knav::merge(folders, options.out);
     for (const auto& [name, value] :
          {std::pair{"--world", options.world}, std::pair{"--changes", options.changes}}) {
       if (value.empty()) throw knav::UserError(fmt::format("{} is missing; see --help.", name));
     }
-    options.config = knav::configuration_file(options.config);
-    knav::drive(options);
+    options.external = options.config == "external";
+    options.config = options.external ? "" : knav::configuration_file(options.config);
+    knav::check_external_options(*group, options);
+    knav::drive(options, external, map_only);
   });
 }

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 
+#include "brin_benchmark/set_down.h"
 #include "core/error.h"
 
 namespace knav {
@@ -72,16 +72,11 @@ void ClosedLoop::start(const Pose2& T_map_robot) {
 }
 
 bool ClosedLoop::place_near(const Pose2& T_world_robot, const Pose2& T_map_robot) {
-  for (int ring = 0; ring <= 8; ++ring) {
-    for (int k = 0; k < (ring == 0 ? 1 : 12); ++k) {
-      const double angle = k * kPi / 6.0;
-      const Pose2 aside{0.25 * ring * std::cos(angle), 0.25 * ring * std::sin(angle), 0.0};
-      if (!kidnap(T_world_robot * aside)) continue;
-      start(T_map_robot * aside);
-      return true;
-    }
-  }
-  return false;
+  return set_down_near([&](const Pose2& aside) {
+    if (!kidnap(T_world_robot * aside)) return false;
+    start(T_map_robot * aside);
+    return true;
+  });
 }
 
 bool ClosedLoop::kidnap(const Pose2& T_world_robot) {

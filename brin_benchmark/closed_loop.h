@@ -22,7 +22,9 @@ class ClosedLoop {
   void record(Trajectory* truth, Trajectory* estimate);
 
   Simulator& simulator() { return simulator_; }
+  const Simulator& simulator() const { return simulator_; }
   NavigationStack& stack() { return stack_; }
+  const NavigationStack& stack() const { return stack_; }
   double now_s() const { return simulator_.stamp_s(); }
 
   /// One physics step, with all that falls due. Returns the newest command.

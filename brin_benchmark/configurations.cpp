@@ -28,7 +28,7 @@ std::string configuration_file(const std::string& name_or_path) {
       return shipped(name_or_path + ".yaml").string();
   }
   throw UserError(name_or_path +
-                  ": no such configuration; give default, paper_full, paper_baseline or a YAML file.");
+                  ": no such configuration; give default, paper_full, paper_baseline, external or a YAML file.");
 }
 
 }  // namespace knav

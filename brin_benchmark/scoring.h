@@ -30,7 +30,8 @@ struct RunResult {
   std::vector<Collision> collisions_at;
   double time_s = 0.0, distance_m = 0.0;
   double wall_s = 0.0;         ///< what it cost
-  double frame_cost_ms = 0.0;  ///< of the robot's own work, a frame
+  double frame_cost_ms = 0.0;  ///< of the robot's own work, a frame; 0 = not known
+  double frames_dropped = 0.0;  ///< share of the depth frames the simulator was too slow for
 };
 
 /// A mean and its 95 % confidence interval.

@@ -8,11 +8,13 @@
 
 #include "brin_benchmark/benchmark_folder.h"
 #include "brin_benchmark/benchmark_report.h"
+#include "brin_benchmark/lock_step_robot.h"
 #include "brin_benchmark/run_jobs.h"
 #include "core/config.h"
 #include "core/error.h"
 #include "core/file_io.h"
 #include "global_map_builder/build_map_config.h"
+#include "planner_tracker/places.h"
 
 namespace fs = std::filesystem;
 
@@ -50,11 +52,15 @@ nlohmann::json identity(const SessionOptions& o) {
   const auto text = [](const std::string& path) {
     return path.empty() ? std::string() : read_text_file(path);
   };
-  return {{"world", o.world},
+  // A launch file that goes on where a command line began gives absolute paths.
+  const auto named = [&](const std::string& path) {
+    return o.external ? fs::weakly_canonical(path).string() : path;
+  };
+  return {{"world", named(o.world)},
           {"world_text", text(o.world)},
-          {"changes", o.changes},
+          {"changes", named(o.changes)},
           {"changes_text", text(o.changes)},
-          {"config", o.config},
+          {"config", o.external ? "external" : o.config},
           {"config_text", text(o.config)},
           {"calibration_text", text(o.calibration)},
           {"sensor", o.sensor},
@@ -121,29 +127,50 @@ std::vector<std::size_t> BenchmarkSession::missing_runs() const {
   return runs;
 }
 
-void BenchmarkSession::drive(std::size_t run, const RecorderFactory& recorder,
+std::vector<Waypoint> waypoints_on(const std::string& places, std::vector<Waypoint> waypoints, Pose2* T_map_start) {
+  const auto poses = load_places(places);
+  const auto pose = [&](const std::string& name, const char* what) {
+    const auto found = poses.find(name);
+    if (found == poses.end())
+      throw UserError(fmt::format("{}: no place '{}'; give {} there, in the frame of your map.", places, name, what));
+    return found->second;
+  };
+  *T_map_start = pose("start", "where the mapping drive began (the world's 'spawn')");
+  for (Waypoint& waypoint : waypoints) waypoint.T_map_robot = pose(waypoint.name, "the waypoint's pose");
+  return waypoints;
+}
+
+void BenchmarkSession::drive(std::size_t run, const RecorderFactory& recorder, const RobotFactory& robot_factory,
                              const std::function<void(double)>& progress) {
-  BenchmarkSetup setup = setup_;
+  SimulatorConfig simulator = setup_.simulator;
   // Every run has its own noise, whatever ran before it and in which process.
-  setup.simulator.seed = options_.seed + 1000 * static_cast<int>(run + 1);
+  simulator.seed = options_.seed + 1000 * static_cast<int>(run + 1);
   const WorldConfig world = changed_world(options_.world, protocol_, protocol_.runs[run]);
   const std::unique_ptr<FlightRecorder> flight = recorder ? recorder(stem(run)) : nullptr;
+  Pose2 T_map_start;  // the map's origin is where the mapping drive began
+  const std::vector<Waypoint> goals =
+      options_.goals.empty() ? waypoints_ : waypoints_on(options_.goals, waypoints_, &T_map_start);
+  const std::unique_ptr<BenchmarkRobot> robot =
+      robot_factory ? robot_factory(simulator, world, flight.get())
+                    : std::make_unique<LockStepRobot>(simulator, setup_.stack, world, map_, flight.get());
   RunRecord record = run_sequence(
-      setup, world, map_, waypoints_, [&](const std::string&, double fraction) { progress(fraction); },
-      flight.get());
+      *robot, T_map_start, goals, [&](const std::string&, double fraction) { progress(fraction); }, flight.get());
   record.result.name = protocol_.runs[run].name;
   write_trajectory(stem(run) + "_truth.tum", record.truth);
   write_trajectory(stem(run) + "_estimate.tum", record.estimate);
+  // The picture is of the benchmark's own map.
+  for (StampedPose2& pose : record.estimate) pose.T_map_robot = T_map_start.inverse() * pose.T_map_robot;
   write_run_picture(stem(run) + ".png", map_, waypoints_, record);
   write_text_atomically(stem(run) + ".json",
                         to_json(record.result).dump(1) + "\n");  // last: the run is whole
 }
 
-void BenchmarkSession::run(const RecorderFactory& recorder, const SessionProgress& progress) {
+void BenchmarkSession::run(const RecorderFactory& recorder, const SessionProgress& progress,
+                           const RobotFactory& robot) {
   const std::vector<std::size_t> runs = missing_runs();
   run_jobs(
       runs.size(), options_.jobs,
-      [&](std::size_t k, const std::function<void(double)>& report) { drive(runs[k], recorder, report); },
+      [&](std::size_t k, const std::function<void(double)>& report) { drive(runs[k], recorder, robot, report); },
       [&](double fraction) { progress("runs", fraction, fmt::format("{} to drive", runs.size())); });
 }
 

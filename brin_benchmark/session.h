@@ -17,6 +17,8 @@ struct SessionOptions {
   int run = 0;         ///< counted from 1; 0 = all
   bool quick = false;  ///< one run, its first kQuickLegs legs
   int jobs = 1;        ///< runs at a time
+  bool external = false;  ///< other software drives the runs; `config` is that of the mapping drive
+  std::string goals;      ///< poses of the waypoints and of `start` in a map of the user's own; empty: as mapped
 };
 
 /// A benchmark in a folder: the map first, then the runs, each written whole when it ends, so that a session
@@ -40,7 +42,8 @@ class BenchmarkSession {
   /// Drives the mapping tour, unless the folder has the map already.
   void map(const SessionProgress& progress);
   /// Drives the runs that the folder does not have yet.
-  void run(const RecorderFactory& recorder, const SessionProgress& progress);
+  /// @param robot  makes the robot of each run; empty: this project's stack in lock-step
+  void run(const RecorderFactory& recorder, const SessionProgress& progress, const RobotFactory& robot = {});
 
   /// The results of all runs in the folder, in order.
   std::vector<RunResult> results() const;
@@ -48,7 +51,8 @@ class BenchmarkSession {
  private:
   std::vector<std::size_t> missing_runs() const;
   std::string stem(std::size_t run) const;
-  void drive(std::size_t run, const RecorderFactory& recorder, const std::function<void(double)>& progress);
+  void drive(std::size_t run, const RecorderFactory& recorder, const RobotFactory& robot,
+             const std::function<void(double)>& progress);
 
   SessionOptions options_;
   BenchmarkProtocol protocol_;
@@ -56,6 +60,10 @@ class BenchmarkSession {
   MapDirectory map_;
   std::vector<Waypoint> waypoints_;
 };
+
+/// The same waypoints at their poses in another map, and where a run starts there.
+/// @param places  a places.yaml with every waypoint's name and `start`; UserError names the one that is missing
+std::vector<Waypoint> waypoints_on(const std::string& places, std::vector<Waypoint> waypoints, Pose2* T_map_start);
 
 /// The results in a session's folder. UserError if there is none.
 std::vector<RunResult> read_results(const std::string& folder);

@@ -10,7 +10,7 @@ namespace knav {
 
 FramePublisher::FramePublisher(ros::NodeHandle& handle, Simulator& simulator,
                                const SimulatorNodeConfig& config)
-    : simulator_(simulator), config_(config) {
+    : simulator_(&simulator), config_(config) {
   if (config.openni2_device.empty()) {
     image_ = handle.advertise<sensor_msgs::Image>("camera/depth/image_raw", 4);
     info_ = handle.advertise<sensor_msgs::CameraInfo>("camera/depth/camera_info", 4);
@@ -34,7 +34,7 @@ sensor_msgs::ImagePtr FramePublisher::free_image() {
     if (image.use_count() == 1) return image;
   }
   sensor_msgs::ImagePtr image(new sensor_msgs::Image);
-  prepare_depth_message(simulator_.camera(), image.get());
+  prepare_depth_message(simulator_->camera(), image.get());
   if (pool_.size() < 32) pool_.push_back(image);
   return image;
 }
@@ -43,9 +43,9 @@ void FramePublisher::publish_depth(const FrameRequest& request) {
   const sensor_msgs::ImagePtr image = free_image();
   image->encoding = "16UC1";
   cv::Mat view = depth_view(image.get());
-  simulator_.render(request, &view);
+  simulator_->render(request, &view);
   image->header.stamp.fromSec(request.stamp_s);
-  info_.publish(camera_info_message(simulator_.camera(), request.stamp_s));
+  info_.publish(camera_info_message(simulator_->camera(), request.stamp_s));
   image_.publish(image);
 }
 
@@ -53,26 +53,26 @@ void FramePublisher::publish_infrared(const FrameRequest& request) {
   const sensor_msgs::ImagePtr image = free_image();
   image->encoding = "mono16";
   cv::Mat view = depth_view(image.get());
-  simulator_.render_infrared(request, &view);
+  simulator_->render_infrared(request, &view);
   image->header.stamp.fromSec(request.stamp_s);
-  infrared_info_.publish(camera_info_message(simulator_.infrared_camera(), request.stamp_s));
+  infrared_info_.publish(camera_info_message(simulator_->infrared_camera(), request.stamp_s));
   infrared_.publish(image);
 }
 
 void FramePublisher::publish(const FrameRequest& request) {
-  if (openni2_) openni2_->render(simulator_, request);
+  if (openni2_) openni2_->render(*simulator_, request);
   if (depth_is_wanted()) publish_depth(request);
   if (infrared_.getNumSubscribers() > 0) publish_infrared(request);
   const auto every =
       static_cast<std::uint64_t>(std::max(1L, std::lround(config_.frame_rate_hz / config_.scan_rate_hz)));
   if (request.index % every != 0) return;
   if (lidar_.getNumSubscribers() > 0) {
-    simulator_.scan_lidar(request, &scan_);
+    simulator_->scan_lidar(request, &scan_);
     publish_scan(lidar_, "laser");
   }
-  if (range_.getNumSubscribers() > 0) range_.publish(range_message(simulator_, request));
+  if (range_.getNumSubscribers() > 0) range_.publish(range_message(*simulator_, request));
   if (perfect_.getNumSubscribers() > 0) {
-    simulator_.scan_perfect(request, config_.perfect_scan_height_m, &scan_);
+    simulator_->scan_perfect(request, config_.perfect_scan_height_m, &scan_);
     publish_scan(perfect_, "base_link");
   }
 }

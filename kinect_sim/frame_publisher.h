@@ -20,6 +20,9 @@ class FramePublisher {
  public:
   FramePublisher(ros::NodeHandle& handle, Simulator& simulator, const SimulatorNodeConfig& config);
 
+  /// Renders another one from now on: the next run of a benchmark. Not for an OpenNI2 device.
+  void show(Simulator& simulator) { simulator_ = &simulator; }
+
   /// Null unless the Kinect is shown as an OpenNI2 device.
   OpenNI2Output* openni2() { return openni2_.get(); }
 
@@ -33,7 +36,7 @@ class FramePublisher {
   sensor_msgs::ImagePtr free_image();
   void publish_scan(ros::Publisher& publisher, const char* frame);
 
-  Simulator& simulator_;
+  Simulator* simulator_;
   SimulatorNodeConfig config_;
   std::unique_ptr<OpenNI2Output> openni2_;
   ros::Publisher image_, info_, infrared_, infrared_info_, lidar_, perfect_, range_;

@@ -66,6 +66,8 @@ class RobotModel {
     T_world_base_ = T_world_base;
     v_mps_ = w_radps_ = 0.0;
   }
+  /// Where odometry says the robot is; it goes on from there.
+  void set_odometry(const Pose2& T_odom_base) { T_odom_base_ = T_odom_base; }
   const Pose2& T_world_base() const { return T_world_base_; }
   const Pose2& T_odom_base() const { return T_odom_base_; }
   double v_mps() const { return v_mps_; }

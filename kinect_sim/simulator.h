@@ -94,6 +94,8 @@ class Simulator {
 
   /// Puts the robot elsewhere (kidnaps it): odometry does not notice. UserError if something stands there.
   void set_pose(const Pose2& T_world_base);
+  /// Odometry goes on from there: a robot that comes from another building.
+  void set_odometry(const Pose2& T_odom_base) { robot_.set_odometry(T_odom_base); }
   /// Robot, people and counters as at the start; time and odometry go on.
   void reset();
 

@@ -8,6 +8,9 @@
 
 namespace knav {
 
+/// The stamp of a message of any type that begins with a header; false if it does not.
+bool header_stamp(const topic_tools::ShapeShifter& message, double* stamp_s);
+
 /// Waits for a message of any type with a header to arrive with a given stamp.
 class StampWaiter {
  public:

@@ -1,6 +1,7 @@
 // The local mapper in the graph: depth_profile (or any LaserScan on scan_in), odom and TF in; see
 // local_mapper_publisher.h for what goes out.
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <kinect_nav/DepthProfile.h>
 #include <nav_msgs/Odometry.h>
 #include <ros/ros.h>
@@ -62,6 +63,7 @@ class LocalMapperNodelet : public NodeletBase {
                            ros::TransportHints().tcpNoDelay());
     profile_ = node.subscribe("depth_profile", 5, &LocalMapperNodelet::on_profile, this);
     scan_ = node.subscribe("scan_in", 5, &LocalMapperNodelet::on_scan, this);
+    initial_pose_ = node.subscribe("initialpose", 2, &LocalMapperNodelet::on_initial_pose, this);
     timer_ = node.createWallTimer(ros::WallDuration(1.0), &LocalMapperNodelet::on_timer, this);
   }
 
@@ -86,6 +88,13 @@ class LocalMapperNodelet : public NodeletBase {
 
   void on_profile(const kinect_nav::DepthProfileConstPtr& message) { enqueue({message, nullptr}); }
   void on_scan(const sensor_msgs::LaserScanConstPtr& message) { enqueue({nullptr, message}); }
+
+  /// Somebody says where the robot is: it may have been carried there, and the local map would be another place's.
+  void on_initial_pose(const geometry_msgs::PoseWithCovarianceStampedConstPtr&) {
+    pending_.clear();
+    mapper_->reset();
+    NODELET_INFO("A pose was given on %s: the local map begins anew.", initial_pose_.getTopic().c_str());
+  }
 
   void enqueue(Pending frame) {
     pending_.push_back(std::move(frame));
@@ -212,7 +221,7 @@ class LocalMapperNodelet : public NodeletBase {
   tf2_ros::Buffer tf_;
   std::unique_ptr<tf2_ros::TransformListener> listener_;
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
-  ros::Subscriber odom_, profile_, scan_;
+  ros::Subscriber odom_, profile_, scan_, initial_pose_;
   ros::WallTimer timer_;
   std::deque<Pending> pending_;
   DepthProfile profile_buffer_;

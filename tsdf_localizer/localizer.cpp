@@ -30,11 +30,16 @@ const char* verdict_name(LocalizationVerdict verdict) {
   }
 }
 
+namespace {
+constexpr int kGivenPoseScans = 15;  ///< as many old ones are on their way at most, half a second of them
+}  // namespace
+
 struct Localizer::State {
   explicit State(const LocalizerConfig& c) : config(c), belief(c), health(c.health), search(c) {}
 
   void refuse(const char* why);
   void take_motion(const Pose2& T_local_base, std::uint32_t epoch, const Pose2* T_odom_base);
+  void take_motion_after_given_pose(std::uint32_t epoch);
   void begin_epoch(std::uint32_t epoch, const Pose2* T_odom_base);
   void filter(double stamp_s);
   void judge(double stamp_s);
@@ -58,6 +63,7 @@ struct Localizer::State {
   Pose2 T_local_last, T_odom_last,
       T_filter_now;  ///< the last is the motion that the belief has not been told yet
   bool has_odom = false;
+  int given_pose_scans = 0;  ///< scans left in which a new epoch belongs to the pose that was given
   double last_s = 0.0, filtered_s = 0.0;
   /// What was seen before is not to be trusted: perhaps the robot was carried away then. While it is in doubt, and after, if
   /// it turns out to be elsewhere.
@@ -98,6 +104,7 @@ void Localizer::initialize(const Pose2& T_map_base, const Eigen::Matrix3d& covar
   s.break_s.reset();
   s.lost = false;
   s.forced = true;
+  s.given_pose_scans = trust == Trust::kGiven ? kGivenPoseScans : 0;
 }
 
 void Localizer::initialize_globally() {
@@ -164,6 +171,8 @@ void Localizer::State::take_motion(const Pose2& T_local_base, std::uint32_t new_
                                    const Pose2* T_odom_base) {
   if (!has_motion) {
     epoch = new_epoch;
+  } else if (new_epoch != epoch && given_pose_scans > 0) {
+    take_motion_after_given_pose(new_epoch);
   } else if (new_epoch != epoch) {
     begin_epoch(new_epoch, T_odom_base);
   } else {
@@ -173,6 +182,7 @@ void Localizer::State::take_motion(const Pose2& T_local_base, std::uint32_t new_
     search.move(T_step);
   }
   has_motion = true;
+  if (given_pose_scans > 0) --given_pose_scans;
   T_local_last = T_local_base;
   has_odom = T_odom_base != nullptr && is_finite(*T_odom_base);
   if (has_odom) T_odom_last = *T_odom_base;
@@ -191,6 +201,17 @@ void Localizer::State::begin_epoch(std::uint32_t new_epoch, const Pose2* T_odom_
   T_filter_now = Pose2();
   belief.widen(config.epoch_spread_m, config.epoch_spread_rad);
   search.doubt(PoseSearch::Prior::kLocal, "the motion estimate began anew: carried, or reset");
+  health.judge_anew();
+  forced = true;
+}
+
+/// The local mapper begins anew where a pose is given, too; its first scan may come after some of the old ones. What was said
+/// still holds.
+void Localizer::State::take_motion_after_given_pose(std::uint32_t new_epoch) {
+  epoch = new_epoch;
+  given_pose_scans = 0;
+  break_s.reset();
+  search.cut();
   health.judge_anew();
   forced = true;
 }

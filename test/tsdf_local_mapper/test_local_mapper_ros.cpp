@@ -2,6 +2,7 @@
 // a clock that jumps back, and no stamp sent twice.
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/PoseArray.h>
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <gtest/gtest.h>
 #include <kinect_nav/DepthProfile.h>
 #include <kinect_nav/MotionEstimate.h>
@@ -29,6 +30,7 @@ class LocalMapperGraph : public ::testing::Test {
   void SetUp() override {
     odom_ = node_.advertise<nav_msgs::Odometry>("odom", 100);
     profile_ = node_.advertise<kinect_nav::DepthProfile>("depth_profile", 10);
+    initial_pose_ = node_.advertise<geometry_msgs::PoseWithCovarianceStamped>("initialpose", 1);
     laser_ = node_.advertise<sensor_msgs::LaserScan>("scan_in", 10);
     const auto keep = [this](auto& list, const auto& message) { list.push_back(*message); };
     subscribers_ = {
@@ -97,7 +99,7 @@ class LocalMapperGraph : public ::testing::Test {
   }
 
   ros::NodeHandle node_;
-  ros::Publisher odom_, profile_, laser_;
+  ros::Publisher odom_, profile_, laser_, initial_pose_;
   std::vector<ros::Subscriber> subscribers_;
   tf2_ros::StaticTransformBroadcaster broadcaster_;
   RoomWorld world_ = RoomWorld::furnished();
@@ -187,6 +189,15 @@ TEST_F(LocalMapperGraph, EverythingItPublishes) {
   stamp_s_ -= 50.0;
   drive(5, 0.02, 0.0);
   EXPECT_EQ(motion.back().epoch, epoch + 1);
+
+  // Somebody says where the robot is: the local map begins anew. The message has a way of its own, so the frames go on.
+  initial_pose_.publish(geometry_msgs::PoseWithCovarianceStamped());
+  EXPECT_TRUE(wait([&] {
+    stamp_s_ += 1.0 / 30.0;
+    send_odometry();
+    send_profile();
+    return motion.back().epoch == epoch + 2;
+  }));
 
   EXPECT_TRUE(wait([&] {
     return std::any_of(reports.begin(), reports.end(), [](const auto& report) {

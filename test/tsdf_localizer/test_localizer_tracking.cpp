@@ -151,6 +151,30 @@ TEST(LocalizerTracking, GoesOnBlindAndSaysSoInTime) {
   EXPECT_EQ(localizer.result().explained_rays, 0u);
 }
 
+TEST(LocalizerTracking, AGivenPoseHoldsThoughTheMapperBeginsAnewALittleLater) {
+  const Building office = test::office();
+  Localizer localizer{LocalizerConfig()};
+  localizer.set_map(office.distance_map());
+  const Pose2 before{3.5, 5.0, 1.0}, carried_to{10.5, 8.0, 0.0};
+  localizer.initialize(before, Eigen::Vector3d(0.01, 0.01, 0.003).asDiagonal());
+  double t = 0.0;
+  const auto look = [&](const Pose2& at, std::uint32_t epoch) {
+    t += 1.0 / kRate_hz;
+    localizer.update(make_scan(office, at, ScanModel(), t), Pose2(), Pose2(), epoch);
+  };
+  for (int i = 0; i < 30; ++i) look(before, 1);
+  ASSERT_EQ(localizer.result().verdict, V::kOk);
+  localizer.initialize(carried_to, Eigen::Vector3d(0.01, 0.01, 0.003).asDiagonal());
+  for (int i = 0; i < 2; ++i) look(before, 1);  // were on their way
+  look(carried_to, 2);
+  const double given_sd_m = localizer.result().position_sd_m;
+  for (int i = 0; i < 10; ++i) look(carried_to, 2);
+  EXPECT_LT(distance_m(localizer.result().T_map_base, carried_to), 0.1);
+  EXPECT_EQ(localizer.result().verdict, V::kOk) << localizer.result().reason;
+  look(carried_to, 3);
+  EXPECT_GT(localizer.result().position_sd_m, 1.5 * given_sd_m) << "a new epoch widens, but not the pose's own";
+}
+
 TEST(LocalizerInput, SaysWhatIsMissingOrWrongAndKeepsItsState) {
   Localizer localizer{LocalizerConfig()};
   const Building office = test::office();
