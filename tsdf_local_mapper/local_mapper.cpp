@@ -20,6 +20,7 @@ namespace knav {
 namespace {
 
 constexpr int kFewestReadings = 10;
+constexpr float kFree = 0.9f;  ///< F of cells that no surface is near
 constexpr std::size_t kSurfaceColumns = 6;  ///< to either side of a reading, whose points give its surface's direction
 constexpr double kParkedAfter_s = 0.5, kParkedWithin_m = 0.005, kParkedWithin_rad = 0.004;
 
@@ -94,7 +95,8 @@ struct LocalMapper::State {
   void new_epoch(EpochReason why, const std::string& text);
   void forget_pose();
   void note_motion(double stamp_s);
-  void select_points(const TsdfObservation& observation, const Pose2& T_base_sensor);
+  void select_points(const TsdfObservation& observation, const Pose2& T_base_sensor, const Pose2& T_local_base);
+  bool moves(const Pose2& T_local_base, const Pose2& T_base_reading) const;
   float weight_of(const TsdfObservation& observation, std::size_t column) const;
   double evidence_of(double dt_s) const;
   template <class Frame>
@@ -236,8 +238,21 @@ void LocalMapper::State::observe(const Frame& frame) {
   observation_from(frame, limits, &window.scratch());
 }
 
+/// Whether a reading shows somebody or something that moves: it lies near, in what is known to be free, or where the map has
+/// lately forgotten what it held.
+bool LocalMapper::State::moves(const Pose2& T_local_base, const Pose2& T_base_reading) const {
+  const Pose2 at = T_local_base * T_base_reading;
+  const int ix = grid.cell_of(at.x_m), iy = grid.cell_of(at.y_m);
+  if (!grid.contains(ix, iy)) return false;
+  const bool near = std::hypot(T_base_reading.x_m, T_base_reading.y_m) < config.filter.moving_range_m;
+  if (near && grid.known(ix, iy) && grid.distance(ix, iy) >= kFree) return true;
+  const std::uint32_t since = grid.reset_sequence(ix, iy);
+  return since > 0 && since + static_cast<std::uint32_t>(config.filter.changed_frames) > window.next_sequence();
+}
+
 /// The readings that the filter compares: at most config.filter.readings, evenly over the valid columns.
-void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_base_sensor) {
+/// @param T_local_base where the robot probably is
+void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_base_sensor, const Pose2& T_local_base) {
   points.clear();
   const int valid = o.valid_ranges();
   const double stride = std::max(1.0, static_cast<double>(valid) / config.filter.readings);
@@ -249,8 +264,9 @@ void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_
     if (++seen < next) continue;
     next += stride;
     const double x = o.direction_x[i] * o.range_m[i], y = o.direction_y[i] * o.range_m[i];
-    points.add(static_cast<float>(T_base_sensor.x_m + c * x - s * y),
-               static_cast<float>(T_base_sensor.y_m + s * x + c * y), weight_of(o, i));
+    const Pose2 T_base_reading{T_base_sensor.x_m + c * x - s * y, T_base_sensor.y_m + s * x + c * y, 0.0};
+    if (moves(T_local_base, T_base_reading)) continue;
+    points.add(static_cast<float>(T_base_reading.x_m), static_cast<float>(T_base_reading.y_m), weight_of(o, i));
   }
 }
 
@@ -264,7 +280,7 @@ void LocalMapper::State::integrate(const Pose2& T_base_sensor) {
 
 void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, double dt_s) {
   const TsdfObservation& observation = window.scratch();
-  select_points(observation, T_base_sensor);
+  select_points(observation, T_base_sensor, result.T_local_base * T_step);
   const bool readings = points.size() >= static_cast<std::size_t>(kFewestReadings);
   result.outcome = readings ? FrameOutcome::kAligned : FrameOutcome::kNoReadings;
   if (!have_map) {
