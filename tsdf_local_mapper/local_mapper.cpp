@@ -20,7 +20,10 @@ namespace knav {
 namespace {
 
 constexpr int kFewestReadings = 10;
-constexpr float kFree = 0.9f;  ///< F of cells that no surface is near
+constexpr float kFree = 0.9f;               ///< F of cells that no surface is near
+constexpr double kOdometryMayMove_m = 0.3;  ///< a reading by so much, which is less than the truncation
+constexpr double kSds = 8.0;
+constexpr double kSeen_s = 1.0, kChanged_s = 5.0;
 constexpr std::size_t kSurfaceColumns = 6;  ///< to either side of a reading, whose points give its surface's direction
 constexpr double kParkedAfter_s = 0.5, kParkedWithin_m = 0.005, kParkedWithin_rad = 0.004;
 
@@ -95,8 +98,9 @@ struct LocalMapper::State {
   void new_epoch(EpochReason why, const std::string& text);
   void forget_pose();
   void note_motion(double stamp_s);
-  void select_points(const TsdfObservation& observation, const Pose2& T_base_sensor, const Pose2& T_local_base);
-  bool moves(const Pose2& T_local_base, const Pose2& T_base_reading) const;
+  void select_points(const TsdfObservation& observation, const Pose2& T_base_sensor, const Pose2& T_step, double dt_s);
+  double moving_range_m(const Pose2& T_step) const;
+  bool has_come(const Pose2& T_local_point, double range_m, double dt_s) const;
   float weight_of(const TsdfObservation& observation, std::size_t column) const;
   double evidence_of(double dt_s) const;
   template <class Frame>
@@ -238,25 +242,22 @@ void LocalMapper::State::observe(const Frame& frame) {
   observation_from(frame, limits, &window.scratch());
 }
 
-/// Whether a reading shows somebody or something that moves: it lies near, in what is known to be free, or where the map has
-/// lately forgotten what it held.
-bool LocalMapper::State::moves(const Pose2& T_local_base, const Pose2& T_base_reading) const {
-  const Pose2 at = T_local_base * T_base_reading;
-  const int ix = grid.cell_of(at.x_m), iy = grid.cell_of(at.y_m);
-  if (!grid.contains(ix, iy)) return false;
-  const bool near = std::hypot(T_base_reading.x_m, T_base_reading.y_m) < config.filter.moving_range_m;
-  if (near && grid.known(ix, iy) && grid.distance(ix, iy) >= kFree) return true;
-  const std::uint32_t since = grid.reset_sequence(ix, iy);
-  return since > 0 && since + static_cast<std::uint32_t>(config.filter.changed_frames) > window.next_sequence();
+/// How near a reading must be to be taken for somebody who moves: farther off it may be odometry that is wrong.
+double LocalMapper::State::moving_range_m(const Pose2& T_step) const {
+  const double turn_rad = kSds * motion_noise(config.motion, T_step).turn_rad;
+  return std::min(config.filter.moving_range_m, kOdometryMayMove_m / std::max(1e-6, turn_rad));
 }
 
-/// The readings that the filter compares: at most config.filter.readings, evenly over the valid columns.
-/// @param T_local_base where the robot probably is
-void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_base_sensor, const Pose2& T_local_base) {
+/// The readings that the filter compares: at most config.filter.readings, evenly over the valid columns. One that lies near
+/// where nothing was until now is somebody who moves.
+/// @param T_step how far odometry says that the robot has moved since the last estimate
+void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_base_sensor, const Pose2& T_step, double dt_s) {
   points.clear();
   const int valid = o.valid_ranges();
   const double stride = std::max(1.0, static_cast<double>(valid) / config.filter.readings);
   const double c = std::cos(T_base_sensor.yaw_rad), s = std::sin(T_base_sensor.yaw_rad);
+  const Pose2 T_local_base = result.T_local_base * T_step;
+  const double near_m = moving_range_m(T_step);
   double next = 0.5 * stride;
   int seen = 0;
   for (std::size_t i = 0; i < o.columns(); ++i) {
@@ -265,9 +266,19 @@ void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_
     next += stride;
     const double x = o.direction_x[i] * o.range_m[i], y = o.direction_y[i] * o.range_m[i];
     const Pose2 T_base_reading{T_base_sensor.x_m + c * x - s * y, T_base_sensor.y_m + s * x + c * y, 0.0};
-    if (moves(T_local_base, T_base_reading)) continue;
+    if (o.range_m[i] < near_m && has_come(T_local_base * T_base_reading, o.range_m[i], dt_s)) continue;
     points.add(static_cast<float>(T_base_reading.x_m), static_cast<float>(T_base_reading.y_m), weight_of(o, i));
   }
+}
+
+/// Whether what is seen at a point of the local map, at a range, has just come there: the cell is known to be free, has forgotten
+/// what it held only some seconds ago, or has not been seen for long (equation 4: a frame weighs 1 / range^2).
+bool LocalMapper::State::has_come(const Pose2& T_local_point, double range_m, double dt_s) const {
+  const int ix = grid.cell_of(T_local_point.x_m), iy = grid.cell_of(T_local_point.y_m);
+  if (!grid.contains(ix, iy) || !grid.known(ix, iy)) return false;
+  if (grid.distance(ix, iy) >= kFree || grid.weight(ix, iy) * range_m * range_m * dt_s < kSeen_s) return true;
+  const std::uint32_t since = grid.reset_sequence(ix, iy);
+  return since > 0 && (window.next_sequence() - since) * dt_s < kChanged_s;
 }
 
 void LocalMapper::State::integrate(const Pose2& T_base_sensor) {
@@ -280,7 +291,7 @@ void LocalMapper::State::integrate(const Pose2& T_base_sensor) {
 
 void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, double dt_s) {
   const TsdfObservation& observation = window.scratch();
-  select_points(observation, T_base_sensor, result.T_local_base * T_step);
+  select_points(observation, T_base_sensor, T_step, dt_s);
   const bool readings = points.size() >= static_cast<std::size_t>(kFewestReadings);
   result.outcome = readings ? FrameOutcome::kAligned : FrameOutcome::kNoReadings;
   if (!have_map) {

@@ -24,8 +24,7 @@ struct FilterConfig {
   int refinements = 0;
   double depth_trust_m = 3.0;
   double evidence_period_s = 0.3;
-  double moving_range_m = 4.0;
-  int changed_frames = 150;
+  double moving_range_m = 2.5;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -54,12 +53,9 @@ struct FilterConfig {
              "passed; 0 = every frame "
              "in full.");
     v.number("moving_range_m", moving_range_m, 0, 20, "m",
-             "A reading as near as this in what is known to be free is somebody who moves, and says nothing about the pose: "
-             "who walks past a robot that turns would turn the estimate with him. Farther off it may be the pose that is "
-             "wrong. 0 = off.");
-    v.integer("changed_frames", changed_frames, 0, 100000, "frames",
-              "Nor does one in a cell that has forgotten what it held so few frames ago, because something went or appeared "
-              "there. 0 = off.");
+             "A reading as near as this where nothing was until now is somebody who moves, and says nothing about the pose: "
+             "who walks past a robot that turns would turn the estimate with him. Nearer only, if odometry may have turned "
+             "the reading there. 0 = off.");
   }
 };
 

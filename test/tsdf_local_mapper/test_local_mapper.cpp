@@ -352,6 +352,38 @@ TEST_F(LocalMapperTest, ALowThingAcrossTheViewThatLeavesItIsNotBeingCarried) {
   EXPECT_GE(surface, 11);
 }
 
+TEST_F(LocalMapperTest, SomebodyWhoWalksPastDoesNotTurnTheEstimateOfARobotThatTurns) {
+  // In a hall, with its walls 15 m off, the robot turns right by 55 degrees in 2 s while somebody walks past a metre before it,
+  // staying in most of its view.
+  for (const double moving_range_m : {FilterConfig{}.moving_range_m, 0.0}) {
+    config_.filter.moving_range_m = moving_range_m;
+    start();
+    robot_ = DrivenRobot{};
+    const auto hall = [] {
+      RoomWorld world;
+      world.box(-15.0, -16.0, 17.0, 14.0);
+      return world;
+    };
+    world_ = hall();
+    drive(90, 0.015, 0.0);
+    const double before_rad = error().yaw_rad;
+    for (int i = 0; i < 60; ++i) {
+      robot_.drive(0.0, -0.016);
+      world_ = hall();
+      const double y = 0.35 - 0.008 * i;
+      const Pose2 right = robot_.T_world_base * Pose2{1.1, y - 0.25, 0.0}, left = robot_.T_world_base * Pose2{1.1, y + 0.25, 0.0};
+      world_.walls.push_back({right.x_m, right.y_m, left.x_m, left.y_m, HeightClass::kMiddle});
+      frame();
+    }
+    const double turned_rad = std::fabs(error().yaw_rad - before_rad);
+    if (moving_range_m > 0.0) {
+      EXPECT_LT(turned_rad, 0.02);
+    } else {
+      EXPECT_GT(turned_rad, 0.1);
+    }
+  }
+}
+
 TEST_F(LocalMapperTest, ProfilesWithoutReadingsFollowOdometryAndOwnUpToIt) {
   start();
   drive(30, 0.02, 0.0);
