@@ -100,7 +100,8 @@ struct LocalMapper::State {
   void note_motion(double stamp_s);
   void select_points(const TsdfObservation& observation, const Pose2& T_base_sensor, const Pose2& T_step, double dt_s);
   double moving_range_m(const Pose2& T_step) const;
-  bool has_come(const Pose2& T_local_point, double range_m, double dt_s) const;
+  enum class Come { kNo, kPerhaps, kYes };
+  Come has_come(const Pose2& T_local_point, double range_m, double dt_s) const;
   float weight_of(const TsdfObservation& observation, std::size_t column) const;
   double evidence_of(double dt_s) const;
   template <class Frame>
@@ -122,7 +123,7 @@ struct LocalMapper::State {
   PoseBuffer odometry;
   bool odometry_broken = false;  ///< a gap or jump since the last frame
   EpochReason odometry_fault = EpochReason::kOdometryGap;
-  WeightedPoints points;
+  WeightedPoints points, doubtful_points;
 
   bool have_frame = false;  ///< stamp_s, T_odom_base and T_local_base of `result` mean something
   bool have_map = false;
@@ -253,6 +254,7 @@ double LocalMapper::State::moving_range_m(const Pose2& T_step) const {
 /// @param T_step how far odometry says that the robot has moved since the last estimate
 void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_base_sensor, const Pose2& T_step, double dt_s) {
   points.clear();
+  doubtful_points.clear();
   const int valid = o.valid_ranges();
   const double stride = std::max(1.0, static_cast<double>(valid) / config.filter.readings);
   const double c = std::cos(T_base_sensor.yaw_rad), s = std::sin(T_base_sensor.yaw_rad);
@@ -266,19 +268,27 @@ void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_
     next += stride;
     const double x = o.direction_x[i] * o.range_m[i], y = o.direction_y[i] * o.range_m[i];
     const Pose2 T_base_reading{T_base_sensor.x_m + c * x - s * y, T_base_sensor.y_m + s * x + c * y, 0.0};
-    if (o.range_m[i] < near_m && has_come(T_local_base * T_base_reading, o.range_m[i], dt_s)) continue;
-    points.add(static_cast<float>(T_base_reading.x_m), static_cast<float>(T_base_reading.y_m), weight_of(o, i));
+    const Come come = o.range_m[i] < near_m ? has_come(T_local_base * T_base_reading, o.range_m[i], dt_s) : Come::kNo;
+    if (come == Come::kYes) continue;
+    WeightedPoints& list = come == Come::kPerhaps ? doubtful_points : points;
+    list.add(static_cast<float>(T_base_reading.x_m), static_cast<float>(T_base_reading.y_m), weight_of(o, i));
   }
+  // Where most of what is near is new, the robot turns in a small room.
+  if (doubtful_points.size() <= points.size()) return;
+  for (std::size_t k = 0; k < doubtful_points.size(); ++k)
+    points.add(doubtful_points.x_m[k], doubtful_points.y_m[k], doubtful_points.weight[k]);
 }
 
-/// Whether what is seen at a point of the local map, at a range, has just come there: the cell is known to be free, has forgotten
-/// what it held only some seconds ago, or has not been seen for long (equation 4: a frame weighs 1 / range^2).
-bool LocalMapper::State::has_come(const Pose2& T_local_point, double range_m, double dt_s) const {
+/// Has what is seen at a point of the local map, at a range, just come there? It has if the cell is known to be free, or has
+/// forgotten what it held only some seconds ago. It may have if the cell has not been seen for long (equation 4: a frame weighs
+/// 1 / range^2).
+LocalMapper::State::Come LocalMapper::State::has_come(const Pose2& T_local_point, double range_m, double dt_s) const {
   const int ix = grid.cell_of(T_local_point.x_m), iy = grid.cell_of(T_local_point.y_m);
-  if (!grid.contains(ix, iy) || !grid.known(ix, iy)) return false;
-  if (grid.distance(ix, iy) >= kFree || grid.weight(ix, iy) * range_m * range_m * dt_s < kSeen_s) return true;
+  if (!grid.contains(ix, iy) || !grid.known(ix, iy)) return Come::kNo;
   const std::uint32_t since = grid.reset_sequence(ix, iy);
-  return since > 0 && (window.next_sequence() - since) * dt_s < kChanged_s;
+  const bool changed = since > 0 && (window.next_sequence() - since) * dt_s < kChanged_s;
+  if (changed || grid.distance(ix, iy) >= kFree) return Come::kYes;
+  return grid.weight(ix, iy) * range_m * range_m * dt_s < kSeen_s ? Come::kPerhaps : Come::kNo;
 }
 
 void LocalMapper::State::integrate(const Pose2& T_base_sensor) {
