@@ -13,6 +13,7 @@
 #include "tsdf_local_mapper/local_map.h"
 #include "tsdf_local_mapper/pose_filter.h"
 #include "tsdf_local_mapper/range_errors.h"
+#include "tsdf_local_mapper/reading_selection.h"
 #include "tsdf_local_mapper/sliding_window.h"
 #include "tsdf_local_mapper/view_check.h"
 
@@ -20,11 +21,6 @@ namespace knav {
 namespace {
 
 constexpr int kFewestReadings = 10;
-constexpr float kFree = 0.9f;               ///< F of cells that no surface is near
-constexpr double kOdometryMayMove_m = 0.3;  ///< a reading by so much, which is less than the truncation
-constexpr double kSds = 8.0;
-constexpr double kSeen_s = 1.0, kChanged_s = 5.0;
-constexpr std::size_t kSurfaceColumns = 6;  ///< to either side of a reading, whose points give its surface's direction
 constexpr double kParkedAfter_s = 0.5, kParkedWithin_m = 0.005, kParkedWithin_rad = 0.004;
 
 const LocalMapperConfig& checked(const LocalMapperConfig& config) {
@@ -91,6 +87,7 @@ struct LocalMapper::State {
         grid(c.tsdf, c.grid_half_size_m),
         window(c.window),
         filter(c.filter, c.motion, c.odometry_errors, static_cast<std::uint64_t>(c.seed)),
+        readings(c.filter, c.motion),
         view_check(c.continuity, c.contour, c.range_max_m),
         range_errors(c.range_errors, c.tsdf) {}
 
@@ -98,11 +95,6 @@ struct LocalMapper::State {
   void new_epoch(EpochReason why, const std::string& text);
   void forget_pose();
   void note_motion(double stamp_s);
-  void select_points(const TsdfObservation& observation, const Pose2& T_base_sensor, const Pose2& T_step, double dt_s);
-  double moving_range_m(const Pose2& T_step) const;
-  enum class Come { kNo, kPerhaps, kYes };
-  Come has_come(const Pose2& T_local_point, double range_m, double dt_s) const;
-  float weight_of(const TsdfObservation& observation, std::size_t column) const;
   double evidence_of(double dt_s) const;
   template <class Frame>
   void observe(const Frame& frame);
@@ -117,13 +109,13 @@ struct LocalMapper::State {
   TsdfGrid grid;
   SlidingWindow window;
   PoseFilter filter;
+  ReadingSelection readings;
   ViewCheck view_check;
   RangeErrors range_errors;
   DepthProfile corrected;
   PoseBuffer odometry;
   bool odometry_broken = false;  ///< a gap or jump since the last frame
   EpochReason odometry_fault = EpochReason::kOdometryGap;
-  WeightedPoints points, doubtful_points;
 
   bool have_frame = false;  ///< stamp_s, T_odom_base and T_local_base of `result` mean something
   bool have_map = false;
@@ -204,24 +196,6 @@ void LocalMapper::State::note_motion(double stamp_s) {
   parked = stamp_s - moved_stamp_s > kParkedAfter_s;
 }
 
-/// A depth camera's steady errors are along the ray and grow with range: 2 % at 10 m, 4 % at 20 m after a calibration. On
-/// a far wall seen square they pull the robot along as it drives up to it; on one seen at a sharp angle they move the
-/// reading along the wall, which changes nothing, and that is where the heading comes from.
-float LocalMapper::State::weight_of(const TsdfObservation& o, std::size_t column) const {
-  if (!o.pinhole || config.filter.depth_trust_m <= 0.0) return 1.0f;
-  float across = 1.0f;  // sine of the angle between ray and surface
-  if (column >= kSurfaceColumns && column + kSurfaceColumns < o.columns()) {
-    const std::size_t left = column - kSurfaceColumns, right = column + kSurfaceColumns;
-    const float dx = o.direction_x[right] * o.range_m[right] - o.direction_x[left] * o.range_m[left];
-    const float dy = o.direction_y[right] * o.range_m[right] - o.direction_y[left] * o.range_m[left];
-    const float length = std::hypot(dx, dy);
-    if (length > 0.0f) across = std::fabs(o.direction_x[column] * dy - o.direction_y[column] * dx) / length;
-    if (!(across <= 1.0f)) across = 1.0f;  // a neighbour without a reading
-  }
-  const float ratio = o.range_m[column] * across / static_cast<float>(config.filter.depth_trust_m);
-  return 1.0f / (1.0f + ratio * ratio);
-}
-
 /// How much of a frame's evidence is new. A Kinect's bands, blobs of noise and wrong scale stay for many
 /// frames; taken for new evidence thirty times a second they pull the estimate after them.
 double LocalMapper::State::evidence_of(double dt_s) const {
@@ -243,54 +217,6 @@ void LocalMapper::State::observe(const Frame& frame) {
   observation_from(frame, limits, &window.scratch());
 }
 
-/// How near a reading must be to be taken for somebody who moves: farther off it may be odometry that is wrong.
-double LocalMapper::State::moving_range_m(const Pose2& T_step) const {
-  const double turn_rad = kSds * motion_noise(config.motion, T_step).turn_rad;
-  return std::min(config.filter.moving_range_m, kOdometryMayMove_m / std::max(1e-6, turn_rad));
-}
-
-/// The readings that the filter compares: at most config.filter.readings, evenly over the valid columns. One that lies near
-/// where nothing was until now is somebody who moves.
-/// @param T_step how far odometry says that the robot has moved since the last estimate
-void LocalMapper::State::select_points(const TsdfObservation& o, const Pose2& T_base_sensor, const Pose2& T_step, double dt_s) {
-  points.clear();
-  doubtful_points.clear();
-  const int valid = o.valid_ranges();
-  const double stride = std::max(1.0, static_cast<double>(valid) / config.filter.readings);
-  const double c = std::cos(T_base_sensor.yaw_rad), s = std::sin(T_base_sensor.yaw_rad);
-  const Pose2 T_local_base = result.T_local_base * T_step;
-  const double near_m = moving_range_m(T_step);
-  double next = 0.5 * stride;
-  int seen = 0;
-  for (std::size_t i = 0; i < o.columns(); ++i) {
-    if (std::isnan(o.range_m[i])) continue;
-    if (++seen < next) continue;
-    next += stride;
-    const double x = o.direction_x[i] * o.range_m[i], y = o.direction_y[i] * o.range_m[i];
-    const Pose2 T_base_reading{T_base_sensor.x_m + c * x - s * y, T_base_sensor.y_m + s * x + c * y, 0.0};
-    const Come come = o.range_m[i] < near_m ? has_come(T_local_base * T_base_reading, o.range_m[i], dt_s) : Come::kNo;
-    if (come == Come::kYes) continue;
-    WeightedPoints& list = come == Come::kPerhaps ? doubtful_points : points;
-    list.add(static_cast<float>(T_base_reading.x_m), static_cast<float>(T_base_reading.y_m), weight_of(o, i));
-  }
-  // Where most of what is near is new, the robot turns in a small room.
-  if (doubtful_points.size() <= points.size()) return;
-  for (std::size_t k = 0; k < doubtful_points.size(); ++k)
-    points.add(doubtful_points.x_m[k], doubtful_points.y_m[k], doubtful_points.weight[k]);
-}
-
-/// Has what is seen at a point of the local map, at a range, just come there? It has if the cell is known to be free, or has
-/// forgotten what it held only some seconds ago. It may have if the cell has not been seen for long (equation 4: a frame weighs
-/// 1 / range^2).
-LocalMapper::State::Come LocalMapper::State::has_come(const Pose2& T_local_point, double range_m, double dt_s) const {
-  const int ix = grid.cell_of(T_local_point.x_m), iy = grid.cell_of(T_local_point.y_m);
-  if (!grid.contains(ix, iy) || !grid.known(ix, iy)) return Come::kNo;
-  const std::uint32_t since = grid.reset_sequence(ix, iy);
-  const bool changed = since > 0 && (window.next_sequence() - since) * dt_s < kChanged_s;
-  if (changed || grid.distance(ix, iy) >= kFree) return Come::kYes;
-  return grid.weight(ix, iy) * range_m * range_m * dt_s < kSeen_s ? Come::kPerhaps : Come::kNo;
-}
-
 void LocalMapper::State::integrate(const Pose2& T_base_sensor) {
   window.scratch().T_map_sensor = result.T_local_base * T_base_sensor;
   grid.scroll_to(result.T_local_base.x_m, result.T_local_base.y_m, window.next_sequence());
@@ -301,19 +227,20 @@ void LocalMapper::State::integrate(const Pose2& T_base_sensor) {
 
 void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, double dt_s) {
   const TsdfObservation& observation = window.scratch();
-  select_points(observation, T_base_sensor, T_step, dt_s);
-  const bool readings = points.size() >= static_cast<std::size_t>(kFewestReadings);
-  result.outcome = readings ? FrameOutcome::kAligned : FrameOutcome::kNoReadings;
+  WeightedPoints& points =
+      readings.select(observation, T_base_sensor, grid, window.next_sequence(), result.T_local_base, T_step, dt_s);
+  const bool enough = points.size() >= static_cast<std::size_t>(kFewestReadings);
+  result.outcome = enough ? FrameOutcome::kAligned : FrameOutcome::kNoReadings;
   if (!have_map) {
     filter.shift(T_step);
-    have_map = readings;
-    if (readings) result.outcome = FrameOutcome::kStarted;
+    have_map = enough;
+    if (enough) result.outcome = FrameOutcome::kStarted;
   } else if (parked) {
     filter.shift(T_step);
     result.outcome = FrameOutcome::kParked;
   } else {
     filter.predict(T_step);
-    if (readings) {
+    if (enough) {
       filter.update(grid, &points, result.stamp_s, evidence_of(dt_s));
     } else {
       filter.estimate_from_particles();
@@ -322,7 +249,7 @@ void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, 
   result.T_local_base = filter.mean();
   result.covariance = filter.covariance();
   result.covariance.diagonal() += Eigen::Vector3d(1e-6, 1e-6, 1e-6);  // what a cell's 8 bits resolve
-  if (!readings || result.outcome == FrameOutcome::kStarted) return;
+  if (!enough || result.outcome == FrameOutcome::kStarted) return;
   view_check.update(grid, observation, result.T_local_base * T_base_sensor, dt_s);
   if (view_check.carried()) {
     new_epoch(EpochReason::kCarried, "the robot was carried: it looks through the walls that it knew");
