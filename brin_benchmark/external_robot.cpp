@@ -122,7 +122,7 @@ GoalState ExternalRobot::step() {
   advance();
   const GoalState state = stack_->take_state();
   if (state == GoalState::kFailed) failure_ = stack_->failure();
-  if (state != GoalState::kDriving || stack_->has_server()) return state;
+  if (state != GoalState::kDriving || !stack_->lost_server()) return state;
   failure_ = ExternalStack::kServerGone;
   return GoalState::kFailed;
 }

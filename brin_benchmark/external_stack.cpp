@@ -13,6 +13,7 @@
 namespace knav {
 namespace {
 
+const char* const kAction = "move_base";
 const char* const kMapFrame = "map";
 const char* const kOdometryFrame = "odom";
 const char* const kBaseFrame = "base_link";
@@ -25,7 +26,7 @@ bool is_frame(const std::string& name, const char* frame) {
 }  // namespace
 
 ExternalStack::ExternalStack(ClockPacer* pacer, const std::string& wait_topic)
-    : pacer_(pacer), listener_(tf_), client_(handle_, "move_base", true) {
+    : pacer_(pacer), listener_(tf_), watch_(handle_, kAction), client_(handle_, kAction, true) {
   initial_pose_ = handle_.advertise<geometry_msgs::PoseWithCovarianceStamped>("initialpose", 2);
   const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
   if (wait_topic.empty()) {
@@ -85,6 +86,7 @@ void ExternalStack::clear_costmaps() {
 
 void ExternalStack::send_goal(const Pose2& T_map_goal) {
   int goal = 0;
+  departures_ = watch_.departures();
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     goal = ++goals_;
@@ -120,6 +122,8 @@ bool ExternalStack::has_goal() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return has_goal_;
 }
+
+bool ExternalStack::lost_server() const { return !has_server() || watch_.departures() != departures_; }
 
 GoalState ExternalStack::take_state() {
   const std::lock_guard<std::mutex> lock(mutex_);

@@ -11,6 +11,7 @@
 #include <mutex>
 #include <string>
 
+#include "brin_benchmark/action_server_watch.h"
 #include "brin_benchmark/benchmark_robot.h"
 #include "brin_benchmark/clock_pacer.h"
 #include "core/pose2.h"
@@ -43,6 +44,8 @@ class ExternalStack {
   void send_goal(const Pose2& T_map_goal);
   void cancel();
   bool has_goal() const;
+  /// The server that got the goal is no more, though another may have taken its place.
+  bool lost_server() const;
   /// What became of the goal is told once; failure() then has the server's words.
   GoalState take_state();
   std::string failure() const;
@@ -59,6 +62,8 @@ class ExternalStack {
   tf2_ros::TransformListener listener_;
   ros::Publisher initial_pose_;
   ros::Subscriber answers_;
+  ActionServerWatch watch_;
+  int departures_ = 0;  ///< of servers, when the goal was sent
 
   mutable std::mutex mutex_;  ///< what the action client's thread tells
   int goals_ = 0;             ///< sent so far; what is told of an older one is not heard

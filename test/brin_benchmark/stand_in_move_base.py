@@ -1,10 +1,12 @@
 #!/usr/bin/python3
 """A stack as small as can be: a move_base action that drives straight at its goal on the true pose, and says by TF that
-its map is the world. Private parameters: abort_goal and die_at_goal (counted from 1), commands (false: never publishes
-on cmd_vel), log (a file that receives a line of JSON for every goal)."""
+its map is the world. Private parameters: abort_goal and die_at_goal (counted from 1), halt (a process
+that it stops before it dies), commands (false: never publishes on cmd_vel), log (a file that receives a line of JSON for
+every goal)."""
 import json
 import math
 import os
+import signal
 
 import actionlib
 import rospy
@@ -25,10 +27,23 @@ def wrapped(angle):
     return math.remainder(angle, 2 * math.pi)
 
 
+class Server(actionlib.SimpleActionServer):
+    """Dies, where it is to, before anybody can hear that it took the goal."""
+
+    goals = die_at_goal = halt = 0
+
+    def internal_goal_callback(self, goal):
+        self.goals += 1
+        if self.goals == self.die_at_goal:
+            if self.halt:
+                os.kill(self.halt, signal.SIGSTOP)
+            os._exit(1)
+        super().internal_goal_callback(goal)
+
+
 class StandIn:
     def __init__(self):
         self.abort_goal = rospy.get_param("~abort_goal", 0)
-        self.die_at_goal = rospy.get_param("~die_at_goal", 0)
         self.log = rospy.get_param("~log", "")
         self.truth = self.odometry = self.said = None
         self.sensors = {}
@@ -40,7 +55,9 @@ class StandIn:
         rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self.on_pose)
         for topic, kind in (("scan", LaserScan), ("camera/depth/camera_info", CameraInfo)):
             rospy.Subscriber(topic, kind, self.on_sensor, topic)
-        self.server = actionlib.SimpleActionServer("move_base", MoveBaseAction, self.drive, False)
+        self.server = Server("move_base", MoveBaseAction, self.drive, False)
+        self.server.die_at_goal = rospy.get_param("~die_at_goal", 0)
+        self.server.halt = rospy.get_param("~halt", 0)
         self.server.start()
 
     def on_sensor(self, message, topic):
@@ -76,8 +93,6 @@ class StandIn:
             with open(self.log, "a", encoding="utf-8") as text:
                 text.write(json.dumps({"goal": plane(goal.target_pose.pose), "frame": goal.target_pose.header.frame_id,
                                        "truth": self.truth, "said": self.said, "sensors": self.sensors}) + "\n")
-        if self.goals == self.die_at_goal:
-            os._exit(1)
         if self.goals == self.abort_goal:
             self.server.set_aborted(text="the floor is wet")
             return
