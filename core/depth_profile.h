@@ -11,6 +11,7 @@ enum class HeightClass : std::uint8_t {
   kLow = 1,     ///< its top drops out of the view's lower edge (a box)
   kMiddle = 2,  ///< stays in view (walls, people)
   kHigh = 3,    ///< its underside leaves by the upper edge (a sign)
+  kBlind = 4,   ///< the column shows nothing at all, not even the floor, which is in the view: no obstacle, or one too near
 };
 
 /// The nearest obstacle per image column, and where the column was really seen free (paper section III.C).

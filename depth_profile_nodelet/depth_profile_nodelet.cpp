@@ -80,7 +80,7 @@ class DepthProfileNodelet : public NodeletBase {
     }
     height_class_.resize(floor.height_class.size());
     for (std::size_t u = 0; u < height_class_.size(); ++u) {
-      height_class_[u] = static_cast<HeightClass>(std::min<int>(floor.height_class[u], 3));
+      height_class_[u] = static_cast<HeightClass>(std::min<int>(floor.height_class[u], 4));
     }
     extractor_->extract(sliced, camera_, image.header.stamp.toSec(), floor.height_m, floor.free_from,
                         floor.free_to, height_class_, &profile_);

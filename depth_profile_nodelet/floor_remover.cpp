@@ -13,6 +13,9 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kFollowedFrom_m = 0.8f;  // nearer the sensor may see nothing
+/// A camera that shows the floor from here on always sees some of it, unless something stands before it.
+constexpr float kFloorAlwaysFrom_m = 4.0f;
+constexpr float kStrays = 3.0f;  // readings in a column that shows nothing: fewer than this
 
 /// For one row: with x the normalised column of the source pixel, up . ray = up_x x + up_row, and the same
 /// for forward.
@@ -55,7 +58,7 @@ struct FollowTerms {
 KNAV_MULTIVERSION
 void follow_row(const float* z_m, const float* x, int width, const RowTerms& terms, const FollowTerms& follow,
                 float* free_from, float* free_to, float* alive, float* floor_rows, float* below_rows,
-                float* sweep_rows, float* sweep_seen) {
+                float* sweep_rows, float* sweep_seen, float* seen_rows) {
   const RowTerms t = terms;
   const FollowTerms f = follow;
   // Every value is loaded before it is chosen between, and masks are 0 / 1: else the loop does not vectorise.
@@ -87,7 +90,9 @@ void follow_row(const float* z_m, const float* x, int width, const RowTerms& ter
     float sweeps = expected > f.floor_range_m ? 1.0f : 0.0f;
     sweeps = up_ray < -1e-4f ? sweeps : 0.0f;
     sweep_rows[u] += sweeps;
-    sweep_seen[u] += z > 0.0f ? sweeps : 0.0f;
+    const float seen = z > 0.0f ? 1.0f : 0.0f;
+    sweep_seen[u] += seen * sweeps;
+    seen_rows[u] += seen;
   }
 }
 
@@ -147,7 +152,7 @@ void FloorRemover::Columns::reset(int width) {
   free_from_m.assign(size, std::numeric_limits<float>::infinity());
   free_to_m.assign(size, 0.0f);
   alive.assign(size, 1.0f);
-  for (auto* counts : {&floor_rows, &below_rows, &sweep_rows, &sweep_seen}) counts->assign(size, 0.0f);
+  for (auto* counts : {&floor_rows, &below_rows, &sweep_rows, &sweep_seen, &seen_rows}) counts->assign(size, 0.0f);
 }
 
 FloorRemover::FloorRemover(const FloorRemovalConfig& config) : config_(config), fit_(config.fit) {
@@ -216,7 +221,7 @@ void FloorRemover::slice_rows(const cv::Mat& depth, const PinholeModel& camera, 
     if (steepest < 0.0f) {
       follow_row(z_m, x, depth.cols, terms, follow, columns_.free_from_m.data(), columns_.free_to_m.data(),
                  columns_.alive.data(), columns_.floor_rows.data(), columns_.below_rows.data(),
-                 columns_.sweep_rows.data(), columns_.sweep_seen.data());
+                 columns_.sweep_rows.data(), columns_.sweep_seen.data(), columns_.seen_rows.data());
     }
   }
 }
@@ -231,6 +236,8 @@ void FloorRemover::conclude(const PinholeModel& camera, const FloorPlane& plane,
   classify(camera, plane, sliced);
   const std::vector<float>& nearest_m = surface_.nearest_m();
   const auto floor_range_m = static_cast<float>(config_.floor_range_m);
+  const Level level = level_of(plane);
+  const bool floor_in_view = level.valid && floor_begins_m(camera, level, plane.height_m, sliced.rows - 1) < kFloorAlwaysFrom_m;
   for (std::size_t u = 0; u < width; ++u) {
     const float z = nearest_m[u];
     const bool surface = !std::isnan(z);
@@ -238,6 +245,8 @@ void FloorRemover::conclude(const PinholeModel& camera, const FloorPlane& plane,
       result->height_class[u] = middle_seen_[u] >= 2.0f ? HeightClass::kMiddle
                                 : low_seen_[u] > 0.0f   ? HeightClass::kLow
                                                         : HeightClass::kHigh;
+    } else if (floor_in_view && columns_.seen_rows[u] < kStrays) {
+      result->height_class[u] = HeightClass::kBlind;
     }
     const bool drop = columns_.below_rows[u] >= 3.0f;
     float from = columns_.free_from_m[u], to = columns_.free_to_m[u];

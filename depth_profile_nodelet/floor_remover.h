@@ -59,7 +59,7 @@ struct FloorResult {
   /// Levelled forward distance, NaN = nothing seen free. Where free_to reaches the nearest surface it ends at
   /// the far side of that surface's noise; ProfileExtractor ends it at the surface.
   std::vector<float> free_from_m, free_to_m;
-  std::vector<HeightClass> height_class;  ///< of the nearest supported obstacle
+  std::vector<HeightClass> height_class;  ///< of the nearest supported obstacle, or kBlind
 };
 
 /// Paper section III.C: takes the floor and what is above 2 m out of the image and levels the rest: each kept
@@ -96,7 +96,7 @@ class FloorRemover {
 
  private:
   struct Columns {  // one entry per column
-    std::vector<float> free_from_m, free_to_m, alive, floor_rows, below_rows, sweep_rows, sweep_seen;
+    std::vector<float> free_from_m, free_to_m, alive, floor_rows, below_rows, sweep_rows, sweep_seen, seen_rows;
     void reset(int width);
   };
   void slice_rows(const cv::Mat& depth, const PinholeModel& camera, const FloorPlane& plane, cv::Mat* sliced);

@@ -46,8 +46,8 @@ void ProfileExtractor::extract(const cv::Mat& sliced, const PinholeModel& camera
   profile->height_class.assign(width, HeightClass::kNone);
   for (std::size_t u = 0; u < width; ++u) {
     const float z = profile->z_m[u];
-    if (!std::isnan(z))
-      profile->height_class[u] = u < height_class.size() ? height_class[u] : HeightClass::kMiddle;
+    const HeightClass height = u < height_class.size() ? height_class[u] : HeightClass::kMiddle;
+    if (!std::isnan(z) || height == HeightClass::kBlind) profile->height_class[u] = height;
     if (u >= free_from_m.size() || u >= free_to_m.size()) continue;
     const float to = std::isnan(z) ? free_to_m[u] : std::min(free_to_m[u], z);
     if (free_from_m[u] < to) {
@@ -56,7 +56,7 @@ void ProfileExtractor::extract(const cv::Mat& sliced, const PinholeModel& camera
     }
     // Another stage saw no obstacle where this one does (the paper's minimum takes any stray): it stays in
     // view.
-    if (!std::isnan(z) && profile->height_class[u] == HeightClass::kNone) {
+    if (!std::isnan(z) && (profile->height_class[u] == HeightClass::kNone || profile->height_class[u] == HeightClass::kBlind)) {
       profile->height_class[u] = HeightClass::kMiddle;
     }
   }

@@ -150,7 +150,7 @@ void profile(Archive& a, DepthProfile& p) {
   lengths(a, p.free_from_m, unit_m);
   lengths(a, p.free_to_m, unit_m);
   list(a, p.height_class, [&](HeightClass& h) {
-    auto code = static_cast<std::uint8_t>(h);
+    auto code = static_cast<std::uint8_t>(h == HeightClass::kBlind ? HeightClass::kNone : h);
     a.plain(code);
     h = static_cast<HeightClass>(code & 3);
   });

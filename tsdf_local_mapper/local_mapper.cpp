@@ -10,6 +10,7 @@
 #include "core/config.h"
 #include "core/contour.h"
 #include "core/pose_buffer.h"
+#include "tsdf_local_mapper/close_obstacles.h"
 #include "tsdf_local_mapper/local_map.h"
 #include "tsdf_local_mapper/pose_filter.h"
 #include "tsdf_local_mapper/range_errors.h"
@@ -89,6 +90,7 @@ struct LocalMapper::State {
         filter(c.filter, c.motion, c.odometry_errors, static_cast<std::uint64_t>(c.seed)),
         readings(c.filter, c.motion),
         view_check(c.continuity, c.contour, c.range_max_m),
+        close_obstacles(c.close_obstacles),
         range_errors(c.range_errors, c.tsdf) {}
 
   void add_odometry(double stamp_s, const Pose2& T_odom_base);
@@ -111,6 +113,7 @@ struct LocalMapper::State {
   PoseFilter filter;
   ReadingSelection readings;
   ViewCheck view_check;
+  CloseObstacles close_obstacles;
   RangeErrors range_errors;
   DepthProfile corrected;
   PoseBuffer odometry;
@@ -172,6 +175,7 @@ void LocalMapper::State::new_epoch(EpochReason why, const std::string& text) {
   range_errors.new_map();
   have_map = false;
   view_check.reset();
+  close_obstacles.reset();
   if (any_epoch) ++result.epoch;
   any_epoch = true;
   result.epoch_reason = why;
@@ -321,6 +325,9 @@ const LocalMapperResult& LocalMapper::State::update(const Frame& frame, bool sen
   align(T_step, T_base_sensor, dt);
   newest_integrated = result.outcome != FrameOutcome::kSuspicious;
   if (newest_integrated) integrate(T_base_sensor);
+  if constexpr (std::is_same_v<Frame, DepthProfile>) {
+    close_obstacles.update(frame, result.T_local_base * T_base_sensor, grid);
+  }
 
   result.accepted = true;
   result.reason = std::move(news);
@@ -364,12 +371,14 @@ void LocalMapper::extract_scan_360(RangeScan* scan) const {
   if (s.config.contour.merge_newest && s.window.size() > 0 && s.newest_integrated) {
     merge_newest(s.window.at(s.window.size() - 1), s.result.T_local_base, scan);
   }
+  s.close_obstacles.add_to(s.result.T_local_base, scan);
 }
 
 void LocalMapper::extract_local_map(OccupancyGrid* map) const {
   const State& s = *state_;
   extract_occupancy(s.grid, s.result.T_local_base.x_m, s.result.T_local_base.y_m, s.config.local_map_size_m,
                     SurfaceRule(s.config.contour.surface_within), map);
+  s.close_obstacles.add_to(map);
 }
 
 void LocalMapper::reset() {

@@ -6,6 +6,7 @@
 #include "core/contour.h"
 #include "core/motion_model.h"
 #include "core/tsdf_grid.h"
+#include "tsdf_local_mapper/close_obstacles.h"
 #include "tsdf_local_mapper/range_errors.h"
 #include "tsdf_local_mapper/steady_errors.h"
 #include "tsdf_local_mapper/window_config.h"
@@ -131,6 +132,7 @@ struct LocalMapperConfig {
   SteadyErrorsConfig odometry_errors;
   RangeErrorsConfig range_errors;
   ContourConfig contour;
+  CloseObstaclesConfig close_obstacles;
   ContinuityConfig continuity;
   LocalMapperRosConfig ros;
 
@@ -153,6 +155,7 @@ struct LocalMapperConfig {
     v.group("odometry_errors", odometry_errors, "How wrong it may be steadily, which the filter learns.");
     v.group("range_errors", range_errors, "How wrong the depth camera may be steadily, which the mapper learns.");
     v.group("contour", contour, "The virtual 360-degree scan.");
+    v.group("close_obstacles", close_obstacles, "Who stands too near for the camera to see.");
     v.group("continuity", continuity, "Gaps, jumps and being carried.");
     v.group("ros", ros, "Frames and rates of the nodelet; no effect offline.");
   }

@@ -285,6 +285,28 @@ TEST(FloorRemover, NothingIsFreeWhereTheFloorIsNotInView) {
             count_nan(seen.profile.z_m) == 640);
 }
 
+TEST(FloorRemover, ColumnsWithoutAnyReadingAreBlindIfTheFloorIsInView) {
+  Scene scene;
+  scene.floor();
+  scene.wall(4.0);
+  const auto blind = [&](const Eigen::Isometry3d& T_base_optical) {
+    FloorRemover remover{FloorRemovalConfig{}};
+    cv::Mat depth = test::render(scene, kinect_camera(), T_base_optical);
+    depth.colRange(100, 300).setTo(std::numeric_limits<float>::quiet_NaN());
+    const Seen seen = look(&remover, depth, T_base_optical);
+    std::vector<int> columns;
+    for (int u = 0; u < 640; ++u) {
+      if (seen.profile.height_class[static_cast<std::size_t>(u)] == HeightClass::kBlind) columns.push_back(u);
+    }
+    return columns;
+  };
+  const std::vector<int> level = blind(mount());
+  ASSERT_EQ(level.size(), 200u);
+  EXPECT_EQ(level.front(), 100);
+  EXPECT_EQ(level.back(), 299);
+  EXPECT_TRUE(blind(mount(1.3, -25.0)).empty()) << "it looks up, where there may be nothing to see";
+}
+
 TEST(FloorRemover, SurvivesFramesThatShowNothing) {
   FloorRemover remover{FloorRemovalConfig{}};
   const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();

@@ -54,7 +54,7 @@ struct RoomWorld {
     return nearest;
   }
 
-  /// A Kinect's profile with noise growing as the range squared; floor seen free from 1.3 m on.
+  /// A Kinect's profile with noise growing as the range squared; floor seen free from 1.3 m on; nearer than 0.5 m it is blind.
   DepthProfile profile(const Pose2& T_world_camera, double stamp_s, std::uint64_t seed = 1) const {
     DepthProfile profile;
     profile.stamp_s = stamp_s;
@@ -74,7 +74,7 @@ struct RoomWorld {
       profile.free_from_m.push_back(floor ? 1.3f : std::numeric_limits<float>::quiet_NaN());
       profile.free_to_m.push_back(floor ? static_cast<float>(noisy - 0.1)
                                         : std::numeric_limits<float>::quiet_NaN());
-      profile.height_class.push_back(seen ? height : HeightClass::kNone);
+      profile.height_class.push_back(seen ? height : z <= 0.5 ? HeightClass::kBlind : HeightClass::kNone);
     }
     return profile;
   }
