@@ -17,6 +17,8 @@ void resize(std::size_t columns, TsdfObservation* out) {
   }
   out->standing.assign(columns, 0);
   out->any_standing = false;
+  out->behind_limit.assign(columns, -1.0f);
+  out->any_edge = false;
 }
 
 void set_truncation(const TruncationConfig& truncation, std::size_t i, TsdfObservation* out) {
@@ -75,6 +77,34 @@ void set_clear(const ObservationLimits& limits, TsdfObservation* out) {
   pass(static_cast<std::ptrdiff_t>(n) - 1, -1);
 }
 
+/// A ray that meets a thing near its edge leaves it by its side soon. If all of the truncation behind it counted, a spur as long
+/// would stand out of the thing's far corner, and close the way past it.
+void set_edges(const TruncationConfig& truncation, TsdfObservation* out) {
+  const auto width = static_cast<float>(truncation.edge_width_m);
+  if (width <= 0.0f) return;
+  const auto count = static_cast<std::ptrdiff_t>(out->columns());
+  /// Column `beyond` reaches past what the columns before it, in the direction of -step, met.
+  const auto mark = [&](std::ptrdiff_t last, std::ptrdiff_t beyond, std::ptrdiff_t step) {
+    const auto k = static_cast<std::size_t>(beyond);
+    for (std::ptrdiff_t q = last; q >= 0 && q < count; q -= step) {
+      const auto i = static_cast<std::size_t>(q);
+      if (!(seen_to(*out, k) > out->range_m[i] + out->truncation_m[i])) break;
+      if (out->range_m[i] * sine_between(*out, i, k) > width) break;
+      out->behind_limit[i] = -static_cast<float>(truncation.edge_behind);
+      out->any_edge = true;
+    }
+  };
+  std::ptrdiff_t last = -1;  // the last column that saw something
+  for (std::ptrdiff_t p = 0; p < count; ++p) {
+    if (!answered(*out, static_cast<std::size_t>(p))) continue;
+    if (last >= 0) {
+      mark(last, p, 1);
+      mark(p, last, -1);
+    }
+    last = p;
+  }
+}
+
 void set_reach(TsdfObservation* out) {
   float reach = 0.0f;
   for (std::size_t i = 0; i < out->columns(); ++i) {
@@ -124,6 +154,7 @@ void observation_from(const DepthProfile& profile, const ObservationLimits& limi
     if (free && !std::isnan(out->range_m[i]))
       out->free_to_m[i] = std::min(out->free_to_m[i], out->range_m[i]);
   }
+  set_edges(limits.truncation, out);
   set_clear(limits, out);
   set_reach(out);
 }
@@ -154,6 +185,7 @@ void observation_from(const RangeScan& scan, const ObservationLimits& limits, Ts
       out->free_to_m[i] = r > high ? high : r >= low ? r : -1.0f;
     }
   }
+  // No edges: half a degree apart, rays that meet one wall at a sharp angle end as far apart as those that pass an edge.
   set_clear(limits, out);
   set_reach(out);
 }

@@ -18,6 +18,8 @@ struct TruncationConfig {
   double limit_m = 2.0;
   double behind_full = 0.3;
   int behind_power = 4;
+  double edge_width_m = 0.15;
+  double edge_behind = 0.25;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -31,6 +33,10 @@ struct TruncationConfig {
               "... and falls beyond it to nothing with this power of the rest. 0 = the paper's full weight "
               "throughout, "
               "which thickens thin walls that are seen from both sides.");
+    v.number("edge_width_m", edge_width_m, 0, 1, "m",
+             "DepthProfile: so near to an edge, beside which the view reaches on, a ray may leave a thing by its side: there a surface says "
+             "less about what is behind it. 0 = the same everywhere (the paper's).");
+    v.number("edge_behind", edge_behind, 0, 1, "", "Namely for this share of the truncation.");
   }
   float at(float range_m) const {
     const float mu = static_cast<float>(base_m) + static_cast<float>(per_range_squared) * range_m * range_m;
@@ -58,6 +64,8 @@ struct TsdfObservation {
   std::vector<float> inverse_truncation_per_m;  ///< 1 / mu
   float behind_slope = 1.0f;                    ///< 1 / (1 - behind_full), see TruncationConfig
   int behind_power = 0;
+  std::vector<float> behind_limit;              ///< where F is less, the column says nothing: -1, near an edge more
+  bool any_edge = false;
   /// -1: the surface is a low or a high thing (HeightClass), which leaves the view as the robot drives up to it; 0: not.
   std::vector<std::int32_t> standing;
   bool any_standing = false;

@@ -20,6 +20,8 @@ constexpr double kBeginning_m = 0.5;  ///< of a path, for its direction
 constexpr double kStandsBefore_m = 0.6;  ///< what closes a way may reach this far before the point where it does
 constexpr int kDirections = 24;
 constexpr int kMostTried = 4;
+constexpr double kMovesThere_m = 1.0;  ///< of where the way is closed
+constexpr double kWider_m = 0.05;      ///< a way once found closed must be wider by this on either side to turn back for
 
 }  // namespace
 
@@ -56,18 +58,26 @@ double PlanKeeper::turning_cost_m(const Path& path, const Pose2& robot) const {
   return std::abs(std::atan2(p.y_m, p.x_m)) / config_.max_vel_theta * config_.max_vel_x;
 }
 
-bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s) {
+bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& moving) {
   const bool first = held_since_s_ < 0.0;
-  if (first) held_ = path_;
+  if (first) {
+    held_ = path_;
+    held_for_somebody_ = false;
+  }
   held_.advance(robot);
   const double detour_m = result_.cost_m - held_.remaining_m();
   if (held_.empty() || held_.offset_m() > kOffPath_m || detour_m < config_.planning.hold_detour_m) return false;
   if (first) held_since_s_ = now_s;
-  const double worth_s = config_.planning.hold_share * detour_m / config_.max_vel_x;
-  if (now_s - held_since_s_ > std::max(config_.planning.hold_s, worth_s)) return false;
   std::vector<Point2> way;
   held_.rest(&way);
   if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), &way)) return false;
+  const auto there = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kMovesThere_m; };
+  held_for_somebody_ = held_for_somebody_ || std::any_of(moving.begin(), moving.end(), there);
+  const double worth_s = held_for_somebody_ ? config_.planning.hold_share * detour_m / config_.max_vel_x : 0.0;
+  if (now_s - held_since_s_ > std::max(config_.planning.hold_s, worth_s)) {
+    shut_.add(at_, now_s + config_.planning.closed_memory_s);
+    return false;
+  }
   path_.set(way);
   path_kind_ = Outcome::kToBlockage;
   return true;
@@ -144,7 +154,8 @@ const MapLayer& PlanKeeper::plan_unchanged(CombinedMap& map, const Point2& robot
   return *unchanged;
 }
 
-PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robot, const Point2& goal, double now_s) {
+PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robot, const Point2& goal, double now_s,
+                                       const std::vector<Point2>& moving) {
   switched_ = false;
   const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
   const MapLayer& layer = map.combined();
@@ -184,7 +195,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     }
     const double old = path_kind_ == kind ? old_cost_m(layer, &path_, robot) : kInfinite;
     const bool was_to_goal = kind == Outcome::kToGoal && (holding() || (path_kind_ == kind && !path_.empty()));
-    if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s)) return Outcome::kToBlockage;
+    if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s, moving)) return Outcome::kToBlockage;
     held_since_s_ = -1.0;
     elsewhere_ = look_elsewhere_ = false;
     const bool same_end =
@@ -195,7 +206,10 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     const double now_cost = old + turning_cost_m(path_, T_map_robot), new_cost = result_.cost_m + turning_cost_m(tried_, T_map_robot);
     const bool clearly_better = new_cost < now_cost * (1.0 - config_.planning.switch_gain) &&
                                 new_cost < now_cost - config_.planning.switch_gain_m;
-    if (!same_end || !std::isfinite(old) || clearly_better) take(result_.path);
+    const auto barely_open = [&] {
+      return kind == Outcome::kToGoal && shut_.barely_open(layer, result_.path, config_.hard_radius_m() + kWider_m, now_s);
+    };
+    if (!same_end || !std::isfinite(old) || (clearly_better && !barely_open())) take(result_.path);
     path_kind_ = kind;
     return kind;
   }

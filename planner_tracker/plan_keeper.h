@@ -8,6 +8,7 @@
 #include "planner_tracker/grid_planner.h"
 #include "planner_tracker/path.h"
 #include "planner_tracker/planner_tracker_config.h"
+#include "planner_tracker/shut_ways.h"
 
 namespace knav {
 
@@ -36,8 +37,10 @@ class PlanKeeper {
     elsewhere_ = look_elsewhere_ = false;
     looks_ = 0;
     closed_.clear();
+    shut_.clear();
   }
-  Outcome replan(CombinedMap& map, const Pose2& robot, const Point2& goal, double now_s);
+  /// @param moving  points of the map at which something moves, see MovingCells
+  Outcome replan(CombinedMap& map, const Pose2& robot, const Point2& goal, double now_s, const std::vector<Point2>& moving = {});
   /// True if the way that is closed was open a moment ago and is expected to be again: the outcome is kToBlockage, though there
   /// is a way round.
   bool holding() const { return held_since_s_ >= 0.0; }
@@ -60,7 +63,7 @@ class PlanKeeper {
   /// What it costs to turn towards a path's beginning: the metres the robot could have driven meanwhile.
   double turning_cost_m(const Path& path, const Pose2& robot) const;
   /// True if the way round is to be left alone for now.
-  bool hold(CombinedMap& map, const Point2& robot, double now_s);
+  bool hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& moving);
   void take(const std::vector<Point2>& path);
   /// Finds where the layer closes a way of the unchanged map (at_), and keeps the way's beginning up to where the robot
   /// can look at that from look_distance_m, or nearer where corners hide it. False if the layer does not close it.
@@ -81,6 +84,8 @@ class PlanKeeper {
   std::vector<Point2> rest_;
   Path held_, tried_;
   double held_since_s_ = -1.0;
+  bool held_for_somebody_ = false;  ///< who moved there
+  ShutWays shut_;
   bool look_elsewhere_ = false, elsewhere_ = false;
   int looks_ = 0;                ///< at the present blockage, in vain
   Point2 last_at_;

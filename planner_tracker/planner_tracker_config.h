@@ -57,7 +57,7 @@ struct PlanningConfig {
              "A way that has just been closed is kept for this long, as whoever walks there walks on, if the way round is longer ...");
     v.number("hold_detour_m", hold_detour_m, 0, 100, "m", "... by more than this.");
     v.number("hold_share", hold_share, 0, 1, "",
-             "It is kept longer, for this share of what the way round takes longer at full speed.");
+             "Where somebody is seen to move there it is kept longer, for this share of what the way round takes longer at full speed.");
     v.number("controller_patience", controller_patience, 0.1, 60, "s",
              "The robot waits this long before something in its way, replanning, before it tries reactive "
              "avoidance.");

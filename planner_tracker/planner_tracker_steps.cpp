@@ -100,7 +100,7 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
   next_plan_s = now_s + 1.0 / config.planner_frequency - 0.5 / config.controller_frequency;
   const bool first = goal_allowed_s > 1e8;
   ++plans;
-  outcome = keeper.replan(map, robot.T_map_base, position(goal), now_s);
+  outcome = keeper.replan(map, robot.T_map_base, position(goal), now_s, moving.points());
   using Outcome = PlanKeeper::Outcome;
   // There was a way to this goal before: it is where the robot stands that has none.
   if (outcome == Outcome::kNoPath && !first) outcome = Outcome::kStartBlocked;

@@ -3,6 +3,7 @@
 // bit.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -20,7 +21,7 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 TsdfConfig fixed_truncation(double mu_m) {
   TsdfConfig config;
-  config.truncation = {mu_m, 0.0, mu_m, 0.0, 0};  // the paper's
+  config.truncation = {mu_m, 0.0, mu_m, 0.0, 0, 0.0, 1.0};  // the paper's
   return config;
 }
 
@@ -89,6 +90,34 @@ TEST(TsdfGrid, TruncationGrowsWithRange) {
   EXPECT_FLOAT_EQ(truncation.at(10.0f), 0.7f);
   EXPECT_FLOAT_EQ(truncation.at(20.0f), 1.6f);
   EXPECT_FLOAT_EQ(truncation.at(30.0f), 2.0f);  // its limit
+}
+
+TEST(TsdfGrid, NoSpurStandsOutOfTheFarCornerOfAThing) {
+  // A box's face 1 m ahead on the left, its edge before the middle; a wall at 3 m on the right. mu = 0.4 m.
+  TsdfConfig config = fixed_truncation(0.4);
+  config.truncation.edge_width_m = 0.15;
+  config.truncation.edge_behind = 0.25;
+  std::vector<float> z_m(601, 3.0f);
+  std::fill(z_m.begin(), z_m.begin() + 300, 1.0f);
+  TsdfObservation o;
+  observation_from(profile_of(z_m, 585.0), limits_of(config), &o);
+  // 0.15 m at 1 m are 88 columns; sine instead of tangent leaves one of them.
+  EXPECT_TRUE(o.any_edge);
+  EXPECT_EQ(o.behind_limit[299], -0.25f);
+  EXPECT_EQ(o.behind_limit[299 - 85], -0.25f);
+  EXPECT_EQ(o.behind_limit[299 - 92], -1.0f);
+  EXPECT_EQ(o.behind_limit[300], -1.0f) << "beside the wall something is nearer: that is no edge of the wall";
+  EXPECT_EQ(o.behind_limit[600], -1.0f);
+  TsdfGrid grid(config, 6.0);
+  o.sequence = 1;
+  o.T_map_sensor = {0.025, 0.025, 0.0};
+  grid.add(o);
+  const auto known = [&](double ahead_m, double left_m) {
+    return grid.known(grid.cell_of(0.025 + ahead_m), grid.cell_of(0.025 + left_m));
+  };
+  EXPECT_TRUE(known(1.05, 0.05)) << "5 cm behind the face";
+  EXPECT_FALSE(known(1.2, 0.05)) << "20 cm behind it, near its edge";
+  EXPECT_TRUE(known(1.2, 0.3)) << "20 cm behind it, 25 cm from its edge";
 }
 
 TEST(TsdfGrid, AveragesByWeight) {

@@ -48,6 +48,75 @@ TEST(ClosedWay, IsLeftAloneByARobotThatStandsTooNear) {
   EXPECT_LT(end.x_m, 5.6) << "on this side of the door";
 }
 
+/// Two rooms with a door right before the robot and another one 14 m up the wall.
+class TwoDoors : public ::testing::Test {
+ protected:
+  static OccupancyGrid rooms(double width_m) {
+    OccupancyGrid grid = room(12.0, 20.0);
+    fill(&grid, 5.95, 0.0, 6.05, 20.0, 100);
+    fill(&grid, 5.95, 17.0, 6.05, 18.0, 0);
+    if (width_m > 0.0) fill(&grid, 5.95, 3.0 - 0.5 * width_m, 6.05, 3.0 + 0.5 * width_m, 0);
+    return grid;
+  }
+  TwoDoors() : map_(config_.preferred_radius_m() + 0.2, config_.clearance.occupied_threshold, config_.clearance.free_threshold), keeper_(config_) {
+    map_.set_global({}, rooms(1.0), {});
+    keeper_.set_map(map_);
+    EXPECT_EQ(look(1.0, 0.0), PlanKeeper::Outcome::kToGoal);
+    EXPECT_FALSE(goes_round());
+  }
+  /// The near door is seen open so far, at this time after the beginning.
+  PlanKeeper::Outcome look(double width_m, double at_s, const std::vector<Point2>& moving = {}) {
+    map_.set_local(rooms(width_m), Pose2{});
+    return keeper_.replan(map_, {3.0, 3.0, 0.0}, {10.0, 3.0}, 100.0 + at_s, moving);
+  }
+  bool goes_round() const { return keeper_.path().remaining_m() > 20.0; }
+
+  PlannerTrackerConfig config_;
+  CombinedMap map_;
+  PlanKeeper keeper_;
+};
+
+TEST_F(TwoDoors, ADoorFoundShutIsGoneRoundAfterAMoment) {
+  for (double t = 1.0; t < config_.planning.hold_s; t += 0.5) EXPECT_EQ(look(0.0, t), PlanKeeper::Outcome::kToBlockage) << t;
+  look(0.0, config_.planning.hold_s + 1.5);
+  EXPECT_TRUE(goes_round());
+}
+
+TEST_F(TwoDoors, ForSomebodyWhoWalksThereTheRobotWaitsAsLongAsTheWayRoundIsLong) {
+  // 28 m longer at most: 0.15 x 28 m / 0.6 m/s = 7 s.
+  const double worth_s = config_.planning.hold_share * 28.0 / config_.max_vel_x;
+  ASSERT_GT(worth_s, config_.planning.hold_s + 2.0);
+  EXPECT_EQ(look(0.0, 1.0, {{5.9, 3.2}}), PlanKeeper::Outcome::kToBlockage);
+  EXPECT_EQ(look(0.0, config_.planning.hold_s + 1.5), PlanKeeper::Outcome::kToBlockage);
+  look(0.0, worth_s + 2.0);
+  EXPECT_TRUE(goes_round());
+}
+
+TEST_F(TwoDoors, WhoWalksElsewhereIsNotWaitedFor) {
+  look(0.0, 1.0, {{2.0, 15.0}});
+  look(0.0, config_.planning.hold_s + 1.5);
+  EXPECT_TRUE(goes_round());
+}
+
+TEST_F(TwoDoors, AWayFoundShutMustBeWiderThanTheRobotToTurnBackFor) {
+  look(0.0, 1.0);
+  look(0.0, config_.planning.hold_s + 1.5);
+  ASSERT_TRUE(goes_round());
+  for (double t = 10.0; t < 20.0; t += 1.0) {
+    look(0.65, t);  // just wide enough: 2 x (0.25 + 0.05) m
+    EXPECT_TRUE(goes_round()) << t;
+    look(0.0, t + 0.5);
+    EXPECT_TRUE(goes_round()) << t;
+  }
+  look(0.9, 20.0);
+  EXPECT_FALSE(goes_round());
+}
+
+TEST_F(TwoDoors, ANarrowWayThatWasNeverFoundShutIsTaken) {
+  look(0.65, 1.0);
+  EXPECT_FALSE(goes_round());
+}
+
 TEST(ClosedWay, TheRobotBacksUpFromSomebodyWithItsEyesOnHimUntilHeIsGone) {
   const OccupancyGrid grid = room(10.0, 1.2);
   ToyWorld world(grid, grid, {1.0, 0.6, 0.0});

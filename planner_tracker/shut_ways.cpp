@@ -1,0 +1,27 @@
+#include "planner_tracker/shut_ways.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace knav {
+namespace {
+constexpr double kRound_m = 1.5;  ///< what closes a corridor leaves gaps on either side of it: they belong together
+}  // namespace
+
+bool ShutWays::barely_open(const MapLayer& layer, const std::vector<Point2>& path, double clear_m, double now_s) {
+  shut_.erase(std::remove_if(shut_.begin(), shut_.end(), [&](const Shut& s) { return now_s > s.until_s; }), shut_.end());
+  if (shut_.empty()) return false;
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    const Point2 a = path[i - 1], b = path[i];
+    const int steps = 1 + static_cast<int>(std::hypot(b.x_m - a.x_m, b.y_m - a.y_m) / layer.geometry.resolution_m);
+    for (int k = 0; k <= steps; ++k) {
+      const double share = static_cast<double>(k) / steps;
+      const Point2 p{a.x_m + share * (b.x_m - a.x_m), a.y_m + share * (b.y_m - a.y_m)};
+      const auto beside = [&](const Shut& s) { return std::hypot(s.at.x_m - p.x_m, s.at.y_m - p.y_m) < kRound_m; };
+      if (layer.clearance_m(p.x_m, p.y_m) < clear_m && std::any_of(shut_.begin(), shut_.end(), beside)) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace knav

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include "core/pose2.h"
+#include "planner_tracker/combined_map.h"
+
+namespace knav {
+
+/// Ways that the robot found closed, and went round. A gap just as wide as the robot is open in one frame's map and
+/// closed in the next; who turns back for it each time gets nowhere.
+class ShutWays {
+ public:
+  void clear() { shut_.clear(); }
+  void add(const Point2& at, double until_s) { shut_.push_back({at, until_s}); }
+  /// True if the path leads past a place that was found closed, and is no wider there than `clear_m` on either side.
+  bool barely_open(const MapLayer& layer, const std::vector<Point2>& path, double clear_m, double now_s);
+
+ private:
+  struct Shut {
+    Point2 at;
+    double until_s;
+  };
+  std::vector<Shut> shut_;
+};
+
+}  // namespace knav
