@@ -1,6 +1,7 @@
 #include "brin_benchmark/navigation_stack.h"
 
 #include "core/config.h"
+#include "tsdf_localizer/localizer_node_config.h"
 
 namespace knav {
 namespace {
@@ -37,7 +38,7 @@ NavigationStackConfig NavigationStackConfig::from_file(const std::string& path) 
   NavigationStackConfig config;
   config.front_end = FrontEndConfig::from_file(path);
   config.local_mapper = read_config_section<LocalMapperConfig>(path, "local_mapper");
-  config.localizer = read_config_section<LocalizerConfig>(path, "localizer");
+  config.localizer = read_config_section<LocalizerNodeConfig>(path, "localizer").localizer;
   config.input = read_config_section<NavigationInputConfig>(path, "navigation");
   config.planner_tracker = read_config_section<PlannerTrackerConfig>(path, "planner_tracker");
   return config;

@@ -123,6 +123,12 @@ TEST(Configurations, ThePapersTwoRunsDifferInTheTwoKeysOnly) {
   EXPECT_THROW(configuration_file("papper"), UserError);
 }
 
+TEST(Configurations, TheShippedFileWithTheNodeletsKeysIsTakenToo) {
+  const std::string paper = configuration_file("paper_full");
+  const std::string shipped = paper.substr(0, paper.rfind('/')) + "/default.yaml";
+  EXPECT_EQ(NavigationStackConfig::from_file(shipped).localizer.max_particles, LocalizerConfig{}.max_particles);
+}
+
 TEST(Benchmark, PlaceOffTheTourIsRefusedByName) {
   BenchmarkSetup setup = room_setup();
   setup.sequence = {"nowhere"};

@@ -36,7 +36,7 @@ double distance(const Point2& a, const Point2& b) { return std::hypot(a.x_m - b.
 TEST(ClosedWay, IsLookedAtFromAfar) {
   Point2 at;
   const Point2 end = end_of_way({1.5, 3.0}, &at);
-  EXPECT_NEAR(at.x_m, 5.7, 0.15);  // the wall's face less the robot's radius and 5 cm
+  EXPECT_NEAR(at.x_m, 5.7, 0.15);  // the wall's face less the robot's radius and hard_m
   EXPECT_NEAR(distance(end, at), PlannerTrackerConfig{}.planning.look_distance_m, 0.1);
 }
 
@@ -103,7 +103,7 @@ TEST_F(TwoDoors, AWayFoundShutMustBeWiderThanTheRobotToTurnBackFor) {
   look(0.0, config_.planning.hold_s + 1.5);
   ASSERT_TRUE(goes_round());
   for (double t = 10.0; t < 20.0; t += 1.0) {
-    look(0.65, t);  // just wide enough: 2 x (0.25 + 0.05) m
+    look(0.65, t);  // hardly wider than the robot needs, in cells of 5 cm
     EXPECT_TRUE(goes_round()) << t;
     look(0.0, t + 0.5);
     EXPECT_TRUE(goes_round()) << t;
