@@ -9,7 +9,7 @@ namespace knav {
 
 /// What the robot keeps away from, and how the maps are read.
 struct ClearanceConfig {
-  double hard_m = 0.025;
+  double hard_m = 0.05;
   double preferred_m = 0.25;
   double price = 2.0;
   double escape_m = 1.0;
