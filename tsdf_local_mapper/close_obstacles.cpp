@@ -23,7 +23,8 @@ void CloseObstacles::reset() {
 }
 
 void CloseObstacles::update(const DepthProfile& profile, const Pose2& T_local_camera, const TsdfGrid& grid) {
-  if (config_.distance_m <= 0.0) return;
+  // Who makes profiles by hand may leave the classes out: then nothing is known to be blind.
+  if (config_.distance_m <= 0.0 || profile.height_class.size() != profile.z_m.size()) return;
   find_blind_columns(profile);
   forget(profile, T_local_camera);
   const double apart_px = std::max(1.0, kApart_m * profile.fx_px / config_.distance_m);
@@ -60,7 +61,8 @@ std::size_t CloseObstacles::shadow_columns(const DepthProfile& profile, std::siz
     if (first >= k) nearest_m = std::fmin(nearest_m, profile.z_m[first - k]);
     if (end + k <= profile.z_m.size()) nearest_m = std::fmin(nearest_m, profile.z_m[end + k - 1]);
   }
-  return static_cast<std::size_t>(kBaseline_m * profile.fx_px / static_cast<double>(nearest_m));
+  if (!(nearest_m > 0.0f)) return profile.z_m.size();
+  return static_cast<std::size_t>(std::min(kBaseline_m * profile.fx_px / static_cast<double>(nearest_m), static_cast<double>(profile.z_m.size())));
 }
 
 bool CloseObstacles::goes_blind(std::size_t column, double stamp_s) const {

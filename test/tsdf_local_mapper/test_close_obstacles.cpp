@@ -169,5 +169,27 @@ TEST_F(CloseObstacleTest, ACoveredCameraStopsTheRobotAndANewEpochForgets) {
   EXPECT_EQ(occupied_near(0.4, 0.0), 0);
 }
 
+TEST_F(CloseObstacleTest, ProfilesWithOtherClassesThanColumnsOrWithNonsenseDistancesAreSurvived) {
+  look(30);
+  DepthProfile profile = world_.profile(kT_base_camera, 0.0);
+  const auto give = [&] {
+    stamp_s_ += kFrame_s;
+    profile.stamp_s = stamp_s_;
+    mapper_.add_odometry(stamp_s_, robot_.T_odom_base);
+    EXPECT_TRUE(mapper_.update(profile, kT_base_camera).accepted);
+  };
+  profile.height_class.assign(5000, HeightClass::kBlind);
+  give();
+  profile.height_class.clear();
+  give();
+  profile.height_class.assign(640, HeightClass::kMiddle);
+  std::fill(profile.height_class.begin() + 200, profile.height_class.begin() + 400, HeightClass::kBlind);
+  for (const float z_m : {0.0f, -1.0f, 1e-30f}) {
+    profile.z_m[199] = z_m;
+    give();
+  }
+  EXPECT_EQ(occupied_near(0.4, 0.0), 0) << "all of the run may be the shadow of what is at no distance";
+}
+
 }  // namespace
 }  // namespace knav
