@@ -55,15 +55,22 @@ void PlannerTrackerNodelet::start() {
   tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_);
   advertise(nh);
   subscribe(nh);
-  action_ = std::make_unique<ActionServer>(nh, "move_base", false);
-  action_->registerGoalCallback([this] { on_goal(); });
-  action_->registerPreemptCallback([this] { on_preempt(); });
-  action_->start();
+  offer_action();
   control_timer_ = nh.createTimer(ros::Duration(1.0 / config_.controller_frequency),
                                   &PlannerTrackerNodelet::control, this);
   costmap_timer_ = nh.createTimer(ros::Duration(1.0), &PlannerTrackerNodelet::publish_costmap, this);
   spinner_ = std::make_unique<ros::AsyncSpinner>(1, &queue_);
   spinner_->start();
+}
+
+void PlannerTrackerNodelet::offer_action() {
+  action_.reset();
+  ros::NodeHandle nh(getNodeHandle());
+  nh.setCallbackQueue(&queue_);
+  action_ = std::make_unique<ActionServer>(nh, "move_base", false);
+  action_->registerGoalCallback([this] { on_goal(); });
+  action_->registerPreemptCallback([this] { on_preempt(); });
+  action_->start();
 }
 
 void PlannerTrackerNodelet::advertise(ros::NodeHandle& nh) {
@@ -207,6 +214,12 @@ void PlannerTrackerNodelet::look_up_robot() {
 
 void PlannerTrackerNodelet::control(const ros::TimerEvent&) {
   const ros::Time now = ros::Time::now();
+  if (clock_.jumped_back(now.toSec())) {
+    robot_.has_pose = false;
+    late_transforms_.clock_jumped_back();
+  }
+  // The action server refuses every goal with an earlier stamp than its last one: a new one knows none.
+  if (late_transforms_.step() && !goal_active_) offer_action();
   rebuild_map();
   look_up_robot();
   overlay_local_map();

@@ -21,6 +21,8 @@
 #include <string>
 
 #include "planner_tracker/planner_tracker.h"
+#include "ros_common/clock_watch.h"
+#include "ros_common/late_transforms.h"
 #include "ros_common/nodelet_base.h"
 
 namespace knav {
@@ -36,6 +38,7 @@ class PlannerTrackerNodelet : public NodeletBase {
   using ActionServer = actionlib::SimpleActionServer<move_base_msgs::MoveBaseAction>;
 
   void start() override;
+  void offer_action();
   void advertise(ros::NodeHandle& nh);
   void subscribe(ros::NodeHandle& nh);
 
@@ -73,6 +76,8 @@ class PlannerTrackerNodelet : public NodeletBase {
   ros::CallbackQueue queue_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
   tf2_ros::Buffer tf_;
+  LateTransforms late_transforms_{tf_};
+  ClockWatch clock_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   std::unique_ptr<ActionServer> action_;
   ros::Subscriber map_sub_, distance_sub_, keepout_sub_, local_sub_, scan_sub_, odom_sub_, status_sub_,

@@ -192,6 +192,7 @@ bool LocalizerNodelet::on_set_map(nav_msgs::SetMap::Request& request, nav_msgs::
 bool LocalizerNodelet::clock_jumped_back(double now_s) {
   if (!scan_clock_.jumped_back(now_s)) return false;
   NODELET_WARN("localizer: the clock jumped back; starting anew.");
+  late_transforms_.clock_jumped_back();
   // tf2's listener clears the buffer by itself when ROS time jumps, but not when only the stamps do
   try {
     const auto T = tf_.lookupTransform(config_.odom_frame_id, config_.base_frame_id, ros::Time(0));
@@ -220,8 +221,12 @@ void LocalizerNodelet::on_motion(const kinect_nav::MotionEstimateConstPtr& motio
 
 void LocalizerNodelet::on_timer() {
   const ros::Time now = ros::Time::now();
+  if (timer_clock_.jumped_back(now.toSec())) {
+    broadcaster_->forget();
+    late_transforms_.clock_jumped_back();
+  }
+  late_transforms_.step();
   process_scans();
-  if (timer_clock_.jumped_back(now.toSec())) broadcaster_->forget();
   if (config_.tf_broadcast) broadcaster_->send(now);
   const double silent_s = (ros::WallTime::now() - last_scan_wall_).toSec();
   if (silent_s > config_.scan_timeout_s &&

@@ -16,6 +16,7 @@
 #include <string>
 
 #include "ros_common/clock_watch.h"
+#include "ros_common/late_transforms.h"
 #include "ros_common/nodelet_base.h"
 #include "tsdf_localizer/localizer.h"
 #include "tsdf_localizer/localizer_diagnostics.h"
@@ -59,6 +60,7 @@ class LocalizerNodelet : public NodeletBase {
   LocalizerNodeConfig config_;
   std::unique_ptr<Localizer> localizer_;
   tf2_ros::Buffer tf_;
+  LateTransforms late_transforms_{tf_};
   std::unique_ptr<tf2_ros::TransformListener> listener_;
   std::unique_ptr<MapOdomBroadcaster> broadcaster_;
   std::unique_ptr<ScanInbox> inbox_;
