@@ -85,7 +85,11 @@ BuiltMap map_world(const BenchmarkSetup& setup, std::vector<Waypoint>* waypoints
     if (control.due(now_s)) {
       const TourDriver::Command command = driver.step(now_s, simulator.T_world_base());
       if (command.done) break;
-      if (command.stuck) throw UserError(setup.tour.file + ": the robot makes no headway.");
+      if (command.stuck) {
+        const Pose2& at = simulator.T_world_base();
+        throw UserError(fmt::format("{}: the robot makes no headway at [{:.2f}, {:.2f}]; change the script there.", setup.tour.file,
+                                    at.x_m, at.y_m));
+      }
       if (command.mark) builder.mark(now_s);
       simulator.set_command(command.v_mps, command.w_radps);
       builder.add_odometry(now_s, simulator.T_odom_base());

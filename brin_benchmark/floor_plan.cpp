@@ -14,6 +14,7 @@ constexpr double kCell_m = 0.05;
 constexpr double kReach_m = 1.5;
 constexpr double kSpare_m = 0.07;
 constexpr double kRobotHeight_m = 1.2;
+constexpr double kRing_m = 0.5;
 constexpr int kCoarse = 4;  // cells between the points of reachable()
 
 /// A careful driver's ways: more room than the robot itself would ask for.
@@ -56,7 +57,7 @@ OccupancyGrid occupancy_of(const WorldConfig& world) {
 FloorPlan::FloorPlan(const WorldConfig& world, double robot_radius_m)
     : robot_radius_m_(robot_radius_m),
       start_{world.spawn.x_m, world.spawn.y_m},
-      map_(kReach_m, 65, 25),
+      map_(kReach_m, 65, 25, 0.0, 0.5),
       planner_(careful(robot_radius_m)) {
   map_.set_global({}, occupancy_of(world), {});
   planner_.set_map(map_.global());
@@ -68,15 +69,17 @@ std::vector<Point2> FloorPlan::path(const Point2& from, const Point2& to) const 
   return result.code == PlanCode::kOk ? result.path : std::vector<Point2>{};
 }
 
+std::vector<char> FloorPlan::open_cells(double clearance_m) const {
+  std::vector<char> open(map_.global().geometry.cell_count(), 0);
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    open[i] = map_.global().clearance_of(map_.global().squared_cells[i]) >= clearance_m;
+  }
+  return open;
+}
+
 std::vector<char> FloorPlan::flood(const std::vector<Solid>& added, double clearance_m) const {
   const GridGeometry& g = map_.global().geometry;
-  std::vector<char> open(g.cell_count(), 0), seen(g.cell_count(), 0);
-  for (int iy = 0; iy < g.height_cells; ++iy) {
-    for (int ix = 0; ix < g.width_cells; ++ix) {
-      const std::size_t i = g.index(ix, iy);
-      open[i] = map_.global().clearance_of(map_.global().squared_cells[i]) >= clearance_m;
-    }
-  }
+  std::vector<char> open = open_cells(clearance_m), seen(g.cell_count(), 0);
   // What is added is rounded up to whole cells, as the building itself is.
   const double away_m = clearance_m + 1.5 * kCell_m;
   for (const Solid& solid : added) {
@@ -94,24 +97,72 @@ std::vector<char> FloorPlan::flood(const std::vector<Solid>& added, double clear
       }
     }
   }
-  std::vector<std::pair<int, int>> stack;
-  const auto visit = [&](int ix, int iy) {
-    if (!g.contains(ix, iy)) return;
-    const std::size_t i = g.index(ix, iy);
-    if (!open[i] || seen[i]) return;
-    seen[i] = 1;
-    stack.emplace_back(ix, iy);
+  std::vector<std::size_t> found;
+  flood_from(g.cell_x(start_.x_m), g.cell_y(start_.y_m), open, &seen, &found);
+  return seen;
+}
+
+/// Marks in `seen` all open cells connected with this one that were not, and lists them.
+void FloorPlan::flood_from(int ix, int iy, const std::vector<char>& open, std::vector<char>* seen,
+                           std::vector<std::size_t>* found) const {
+  const GridGeometry& g = map_.global().geometry;
+  found->clear();
+  const auto visit = [&](int x, int y) {
+    if (!g.contains(x, y)) return;
+    const std::size_t i = g.index(x, y);
+    if (!open[i] || (*seen)[i]) return;
+    (*seen)[i] = 1;
+    found->push_back(i);
   };
-  visit(g.cell_x(start_.x_m), g.cell_y(start_.y_m));
-  while (!stack.empty()) {
-    const auto [ix, iy] = stack.back();
-    stack.pop_back();
-    visit(ix + 1, iy);
-    visit(ix - 1, iy);
-    visit(ix, iy + 1);
-    visit(ix, iy - 1);
+  visit(ix, iy);
+  const auto width = static_cast<std::size_t>(g.width_cells);
+  for (std::size_t k = 0; k < found->size(); ++k) {
+    const int x = static_cast<int>((*found)[k] % width), y = static_cast<int>((*found)[k] / width);
+    visit(x + 1, y);
+    visit(x - 1, y);
+    visit(x, y + 1);
+    visit(x, y - 1);
+  }
+}
+
+/// The ground round the building: a world's bounds leave a metre of it on all sides.
+std::vector<char> FloorPlan::outside(const std::vector<char>& open) const {
+  const GridGeometry& g = map_.global().geometry;
+  std::vector<char> seen(g.cell_count(), 0);
+  std::vector<std::size_t> found;
+  const int cells = static_cast<int>(kRing_m / kCell_m);
+  for (const int ix : {cells, g.width_cells - 1 - cells}) {
+    for (const int iy : {cells, g.height_cells - 1 - cells}) flood_from(ix, iy, open, &seen, &found);
   }
   return seen;
+}
+
+bool FloorPlan::starts_inside() const {
+  const GridGeometry& g = map_.global().geometry;
+  const std::vector<char> open = open_cells(robot_radius_m_ + kSpare_m);
+  const int ix = g.cell_x(start_.x_m), iy = g.cell_y(start_.y_m);
+  return g.contains(ix, iy) && open[g.index(ix, iy)] && !outside(open)[g.index(ix, iy)];
+}
+
+std::optional<Point2> FloorPlan::start_inside() const {
+  const GridGeometry& g = map_.global().geometry;
+  const std::vector<char> open = open_cells(robot_radius_m_ + kSpare_m);
+  std::vector<char> seen = outside(open);
+  std::vector<std::size_t> part, largest;
+  for (int iy = 0; iy < g.height_cells; ++iy) {
+    for (int ix = 0; ix < g.width_cells; ++ix) {
+      if (!open[g.index(ix, iy)] || seen[g.index(ix, iy)]) continue;
+      flood_from(ix, iy, open, &seen, &part);
+      if (part.size() > largest.size()) largest.swap(part);
+    }
+  }
+  if (largest.empty()) return std::nullopt;
+  const auto roomier = [&](std::size_t a, std::size_t b) {
+    return map_.global().squared_cells[a] < map_.global().squared_cells[b];
+  };
+  const std::size_t best = *std::max_element(largest.begin(), largest.end(), roomier);
+  const auto width = static_cast<std::size_t>(g.width_cells);
+  return Point2{g.center_x_m(static_cast<int>(best % width)), g.center_y_m(static_cast<int>(best / width))};
 }
 
 bool FloorPlan::connected(const std::vector<Point2>& points, const std::vector<Solid>& added) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/random.h"
@@ -27,9 +28,17 @@ class FloorPlan {
   bool connected(const std::vector<Point2>& points, const std::vector<Solid>& added) const;
   /// Points that can be reached from the start with this clearance, 0.2 m apart, once these stand there too.
   std::vector<Point2> reachable(double clearance_m, const std::vector<Solid>& added = {}) const;
+  /// False if what is reached from the start is the open ground round the building, or if the start is not free.
+  bool starts_inside() const;
+  /// A point with the most room round it, up to 1.5 m, in the largest part of the building that walls close off; none if nothing is
+  /// closed off.
+  std::optional<Point2> start_inside() const;
 
  private:
+  std::vector<char> open_cells(double clearance_m) const;
   std::vector<char> flood(const std::vector<Solid>& added, double clearance_m) const;
+  void flood_from(int ix, int iy, const std::vector<char>& open, std::vector<char>* seen, std::vector<std::size_t>* found) const;
+  std::vector<char> outside(const std::vector<char>& open) const;
 
   double robot_radius_m_;
   Point2 start_;

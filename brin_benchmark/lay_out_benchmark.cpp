@@ -19,7 +19,11 @@ struct Options {
 };
 
 void run(const Options& options) {
-  const WorldConfig world = load_world(options.world);
+  const WorldConfig given = load_world(options.world, StartMustBe::kAnywhere), world = started_inside(given, options.layout.robot_radius_m);
+  if (world.spawn.x_m != given.spawn.x_m || world.spawn.y_m != given.spawn.y_m) {
+    fmt::print("The start, [{:g}, {:g}], is not inside the building; it is now [{:g}, {:g}], in its largest part.\n",
+               given.spawn.x_m, given.spawn.y_m, world.spawn.x_m, world.spawn.y_m);
+  }
   const fs::path prefix(options.prefix);
   const std::string tour_file = options.prefix + "_tour.yaml",
                     changes_file = options.prefix + "_changes.yaml";

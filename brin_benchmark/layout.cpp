@@ -134,6 +134,20 @@ std::string make_tour(const FloorPlan& plan, const WorldConfig& world,
   return text;
 }
 
+WorldConfig started_inside(const WorldConfig& world, double robot_radius_m) {
+  const FloorPlan plan(world, robot_radius_m);
+  if (!world.places.empty() || plan.starts_inside()) return world;
+  const std::optional<Point2> start = plan.start_inside();
+  if (!start) {
+    throw UserError(
+        world.file + ": nowhere do walls close off a part that holds a robot: it would drive round outside. Of an occupancy "
+        "image, occupied_below says what is a wall; grey, which nobody saw, is 205 in map_server's images.");
+  }
+  WorldConfig moved = world;
+  moved.spawn = {std::round(start->x_m * 100.0) / 100.0, std::round(start->y_m * 100.0) / 100.0, world.spawn.yaw_rad};
+  return moved;
+}
+
 Layout lay_out(const WorldConfig& world, const LayoutConfig& config, const std::string& tour_name) {
   const FloorPlan plan(world, config.robot_radius_m);
   Layout layout;

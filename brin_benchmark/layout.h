@@ -34,6 +34,9 @@ struct Layout {
 /// The same world and configuration give the same bytes. UserError if the building leaves no room.
 Layout lay_out(const WorldConfig& world, const LayoutConfig& config, const std::string& tour_name);
 
+/// `world`, with a start inside the building if its own is not (in a world without places: their owner knows where they are).
+/// UserError if nothing is closed off by walls.
+WorldConfig started_inside(const WorldConfig& world, double robot_radius_m);
 /// Places far from each other and from the start, with room around them.
 std::map<std::string, Pose2> choose_places(const FloorPlan& plan, const WorldConfig& world, int count);
 /// Through all places and near every point that can be reached, with a look round at each stop; back to the

@@ -16,6 +16,10 @@
 namespace knav {
 namespace {
 
+/// Free in map_server's images, whose free_thresh is 0.196; what nobody saw, 205, is as solid as a wall.
+constexpr double kMapServerFree = 206;
+
+/// Checks nothing about what stands where: a world that builds on this one may move it.
 WorldConfig parse(const YAML::Node& node, const std::string& file, const std::string& directory, int depth);
 
 void read_occupancy(YamlMap map, const std::string& directory, WorldConfig* world) {
@@ -28,7 +32,7 @@ void read_occupancy(YamlMap map, const std::string& directory, WorldConfig* worl
     grid.geometry.origin_y_m = origin.y_m;
   }
   const double height = map.number("height_m", 0.1, 20, 2.6);
-  const double threshold = map.number("occupied_below", 1, 255, 100);
+  const double threshold = map.number("occupied_below", 1, 255, kMapServerFree);
   const cv::Mat image = cv::imread(image_path, cv::IMREAD_GRAYSCALE);
   if (image.empty()) map.fail("image", "names '" + image_path + "', which cannot be read as an image");
   map.finish();
@@ -75,14 +79,14 @@ bool is_free(const WorldConfig& world, const Point2& at, double radius_m) {
                       [&](const FloorRect& stairs) { return stairs.contains(at.x_m, at.y_m); });
 }
 
-void check_free(const WorldConfig& world) {
+void check_free(const WorldConfig& world, StartMustBe start) {
   const auto check = [&](const Point2& at, double radius_m, const std::string& what) {
     if (!is_free(world, at, radius_m)) {
       throw UserError(fmt::format("{}: {} at [{}, {}] stands in an obstacle; move one of them.", world.file,
                                   what, at.x_m, at.y_m));
     }
   };
-  check({world.spawn.x_m, world.spawn.y_m}, 0.2, "'spawn'");
+  if (start == StartMustBe::kFree) check({world.spawn.x_m, world.spawn.y_m}, 0.2, "'spawn'");
   for (const auto& [name, pose] : world.places) check({pose.x_m, pose.y_m}, 0.2, "'places/" + name + "'");
   for (const PersonConfig& person : world.people) {
     for (const auto& waypoint : person.path)
@@ -154,22 +158,25 @@ WorldConfig parse(const YAML::Node& node, const std::string& file, const std::st
     }
   }
   find_bounds(&world);
-  if (depth == 0) check_free(world);
   return world;
 }
 
 }  // namespace
 
-WorldConfig load_world(const std::string& path) {
+WorldConfig load_world(const std::string& path, StartMustBe start) {
   const YAML::Node node = load_yaml_file(path);
   if (node.IsNull())
     throw UserError(path + ": is empty; a world needs at least walls or an occupancy image.");
-  return parse(node, path, std::filesystem::path(path).parent_path().string(), 0);
+  WorldConfig world = parse(node, path, std::filesystem::path(path).parent_path().string(), 0);
+  check_free(world, start);
+  return world;
 }
 
 WorldConfig parse_world(const std::string& text, const std::string& file_name, const std::string& directory) {
   try {
-    return parse(YAML::Load(text), file_name, directory, 0);
+    WorldConfig world = parse(YAML::Load(text), file_name, directory, 0);
+    check_free(world, StartMustBe::kFree);
+    return world;
   } catch (const YAML::Exception& error) {
     throw UserError(fmt::format("{}: line {}: {}.", file_name, error.mark.line + 1, error.msg));
   }

@@ -84,8 +84,11 @@ struct WorldConfig {
   FloorRect bounds;  ///< of everything, with a margin
 };
 
+/// Whether nothing may stand where the robot starts.
+enum class StartMustBe { kFree, kAnywhere };
+
 /// UserError, one sentence with file and key, for anything unknown, malformed or contradictory.
-WorldConfig load_world(const std::string& path);
+WorldConfig load_world(const std::string& path, StartMustBe start = StartMustBe::kFree);
 /// The same from a text; `directory` resolves the files it names.
 WorldConfig parse_world(const std::string& text, const std::string& file_name,
                         const std::string& directory = ".");

@@ -23,16 +23,18 @@ bool same_grid(const GridGeometry& a, const GridGeometry& b) {
 }  // namespace
 
 int MapLayer::squared_for(double clearance_m) const {
-  const double cells = clearance_m / geometry.resolution_m + 0.5;
+  const double cells = clearance_m / geometry.resolution_m + surface_cells;
   return std::max(1, static_cast<int>(std::ceil(cells * cells - 1e-9)));
 }
 
-CombinedMap::CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s)
+CombinedMap::CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s, double surface_cells)
     : reach_m_(reach_m),
       occupied_threshold_(occupied_threshold),
       free_threshold_(free_threshold),
       distance_(1),
-      memory_s_(memory_s) {}
+      memory_s_(memory_s) {
+  global_.surface_cells = surface_cells;
+}
 
 CellState CombinedMap::local_state(std::int8_t value) const {
   if (value < 0) return CellState::kUnknown;
@@ -169,6 +171,7 @@ void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_lo
 const MapLayer& CombinedMap::permissive(const std::vector<Point2>& closed, double round_m) {
   permissive_.geometry = global_.geometry;
   permissive_.reach_cells = global_.reach_cells;
+  permissive_.surface_cells = global_.surface_cells;
   permissive_.state.resize(global_.state.size());
   permissive_.squared_cells.resize(global_.state.size());
   for (std::size_t i = 0; i < global_.state.size(); ++i) {

@@ -26,6 +26,9 @@ struct MapLayer {
   std::vector<CellState> state;
   std::vector<std::int16_t> squared_cells;  ///< to the nearest cell that is not free, see TruncatedDistance
   int reach_cells = 0;
+  /// Where in a cell that is not free its surface is taken to be, from the cell's middle [cells]: 0.5 its edge, which is never
+  /// too far; 0 its middle, which is right in the mean.
+  double surface_cells = 0.5;
 
   CellState at(int ix, int iy) const {
     return geometry.contains(ix, iy) ? state[geometry.index(ix, iy)] : CellState::kUnknown;
@@ -33,13 +36,13 @@ struct MapLayer {
   std::int16_t squared_at(int ix, int iy) const {
     return geometry.contains(ix, iy) ? squared_cells[geometry.index(ix, iy)] : std::int16_t{0};
   }
-  /// From a point's cell to the edge of the nearest cell that is not free [m]; at most about the layer's
+  /// From the middle of a point's cell to the surface in the nearest cell that is not free [m]; at most about the layer's
   /// reach, 0 in cells that are not free and outside the map.
   double clearance_m(double x_m, double y_m) const {
     return clearance_of(squared_at(geometry.cell_x(x_m), geometry.cell_y(y_m)));
   }
   double clearance_of(std::int16_t squared) const {
-    return squared <= 0 ? 0.0 : (std::sqrt(static_cast<double>(squared)) - 0.5) * geometry.resolution_m;
+    return squared <= 0 ? 0.0 : (std::sqrt(static_cast<double>(squared)) - surface_cells) * geometry.resolution_m;
   }
   /// Smallest squared_cells whose clearance is at least this.
   int squared_for(double clearance_m) const;
@@ -51,7 +54,9 @@ class CombinedMap {
   /// @param reach_m clearances are exact up to this
   /// @param memory_s  how long what the local map showed occupied stays so once it is off its edge. Without it a way closed
   /// at the edge is closed and open by turns as the robot turns away from it and back.
-  CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s = 0.0);
+  /// @param surface_cells  see MapLayer. Walls lie anywhere in their cells: from the cells' edges a lane would lose up to two
+  /// cells of its width, and be closed to a robot that fits. The tracker measures from the scan itself.
+  CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s = 0.0, double surface_cells = 0.0);
 
   /// @param occupancy may be empty if `distance` is not, and the other way round; @param keepout may be
   /// empty. Both given: a cell is free only if both say so. Throws UserError if both are empty or sizes do

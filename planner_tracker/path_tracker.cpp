@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kStep_m = 0.04;
 /// Of the hard clearance, what the tracker insists on: the rest is for the cells' size and the pose's noise.
-constexpr double kInsist = 0.4;
+constexpr double kInsist = 0.6;
 constexpr double kNearEnd_m = 0.4;
 
 }  // namespace

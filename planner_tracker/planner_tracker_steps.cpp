@@ -74,7 +74,8 @@ bool PlannerTracker::State::arrived(const RobotState& robot) {
   }
   if (!latched) return false;
   const double error = T_base_goal.yaw_rad;
-  const bool still = std::abs(input.v_mps) < 0.01 && std::abs(robot.v_mps) < 0.05;
+  const bool still = std::abs(input.v_mps) < 0.01 && std::abs(robot.v_mps) < 0.05 &&
+                     std::abs(input.w_radps) <= config.acc_lim_theta * input.dt_s + 1e-9;
   if (std::abs(error) < config.yaw_goal_tolerance && still) {
     end_goal();
     command = {};

@@ -22,7 +22,8 @@ class ScanView {
   /// Where odometry had the robot at the scan's stamp; then where it is now. Call before the questions below.
   void place(const Pose2& T_odom_base_then, const Pose2& T_odom_base_now);
 
-  /// From a point of the robot's frame to the nearest return [m]; at most the reach.
+  /// From a point of the robot's frame to the nearest return [m]; at most the reach. Exact up to 0.5 m, by cells of
+  /// 4 cm beyond.
   double clearance_m(double x_m, double y_m) const;
   /// How far a disc of this radius may go straight in a direction of the robot's frame [m] before it meets a
   /// return.
@@ -30,11 +31,18 @@ class ScanView {
   double free_m(double bearing_rad, double radius_m, bool unknown_ends) const;
 
  private:
+  void sort_returns();
+  double exact_clearance_m(double x_m, double y_m, double most_m) const;
+
   RangeScan ranges_;
   Pose2 T_base_sensor_;
   Pose2 T_now_sensor_;  ///< of the scan, in the present robot's frame
   MapLayer window_;     ///< round the robot, in its frame
   TruncatedDistance distance_;
+  // The returns in the window, by cell: those of cell i are sorted_[first_[i]] to sorted_[first_[i + 1]].
+  std::vector<Point2> returns_, sorted_;
+  std::vector<std::size_t> cell_;
+  std::vector<std::size_t> first_;
 };
 
 }  // namespace knav

@@ -12,6 +12,7 @@
 #include "core/pose_buffer.h"
 #include "tsdf_local_mapper/close_obstacles.h"
 #include "tsdf_local_mapper/local_map.h"
+#include "tsdf_local_mapper/odometry_bound.h"
 #include "tsdf_local_mapper/pose_filter.h"
 #include "tsdf_local_mapper/range_errors.h"
 #include "tsdf_local_mapper/reading_selection.h"
@@ -89,6 +90,7 @@ struct LocalMapper::State {
         window(c.window),
         filter(c.filter, c.motion, c.odometry_errors, static_cast<std::uint64_t>(c.seed)),
         readings(c.filter, c.motion),
+        odometry_bound(c.odometry_bound, c.motion),
         view_check(c.continuity, c.contour, c.range_max_m),
         close_obstacles(c.close_obstacles),
         range_errors(c.range_errors, c.tsdf) {}
@@ -112,6 +114,7 @@ struct LocalMapper::State {
   SlidingWindow window;
   PoseFilter filter;
   ReadingSelection readings;
+  OdometryBound odometry_bound;
   ViewCheck view_check;
   CloseObstacles close_obstacles;
   RangeErrors range_errors;
@@ -176,6 +179,7 @@ void LocalMapper::State::new_epoch(EpochReason why, const std::string& text) {
   have_map = false;
   view_check.reset();
   close_obstacles.reset();
+  odometry_bound.reset();
   if (any_epoch) ++result.epoch;
   any_epoch = true;
   result.epoch_reason = why;
@@ -249,6 +253,10 @@ void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, 
     } else {
       filter.estimate_from_particles();
     }
+  }
+  Pose2 T_local_base = filter.mean();
+  if (odometry_bound.bound(result.stamp_s, result.T_odom_base, readings.coverage(), &T_local_base)) {
+    filter.shift(filter.mean().inverse() * T_local_base);
   }
   result.T_local_base = filter.mean();
   result.covariance = filter.covariance();

@@ -7,6 +7,7 @@
 #include "core/motion_model.h"
 #include "core/tsdf_grid.h"
 #include "tsdf_local_mapper/close_obstacles.h"
+#include "tsdf_local_mapper/odometry_bound.h"
 #include "tsdf_local_mapper/range_errors.h"
 #include "tsdf_local_mapper/steady_errors.h"
 #include "tsdf_local_mapper/window_config.h"
@@ -130,6 +131,7 @@ struct LocalMapperConfig {
   FilterConfig filter;
   MotionModelConfig motion;
   SteadyErrorsConfig odometry_errors;
+  OdometryBoundConfig odometry_bound;
   RangeErrorsConfig range_errors;
   ContourConfig contour;
   CloseObstaclesConfig close_obstacles;
@@ -153,6 +155,7 @@ struct LocalMapperConfig {
     v.group("filter", filter, "The particle filter.");
     v.group("motion", motion, "How wrong odometry may be from step to step.");
     v.group("odometry_errors", odometry_errors, "How wrong it may be steadily, which the filter learns.");
+    v.group("odometry_bound", odometry_bound, "How far from it alignment may lead where little is in view.");
     v.group("range_errors", range_errors, "How wrong the depth camera may be steadily, which the mapper learns.");
     v.group("contour", contour, "The virtual 360-degree scan.");
     v.group("close_obstacles", close_obstacles, "Who stands too near for the camera to see.");

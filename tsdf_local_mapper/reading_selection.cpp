@@ -63,9 +63,11 @@ WeightedPoints& ReadingSelection::select(const TsdfObservation& o, const Pose2& 
     list.add(static_cast<float>(T_base_reading.x_m), static_cast<float>(T_base_reading.y_m), weight_of(o, i));
   }
   // Where most of what is near is new, the robot turns in a small room.
-  if (doubtful_.size() <= points_.size()) return points_;
-  for (std::size_t k = 0; k < doubtful_.size(); ++k)
-    points_.add(doubtful_.x_m[k], doubtful_.y_m[k], doubtful_.weight[k]);
+  if (doubtful_.size() > points_.size()) {
+    for (std::size_t k = 0; k < doubtful_.size(); ++k)
+      points_.add(doubtful_.x_m[k], doubtful_.y_m[k], doubtful_.weight[k]);
+  }
+  coverage_ = static_cast<double>(points_.size()) * stride / static_cast<double>(std::max<std::size_t>(1, o.columns()));
   return points_;
 }
 

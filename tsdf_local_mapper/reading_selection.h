@@ -23,6 +23,8 @@ class ReadingSelection {
   /// @return valid until the next call; the filter goes on weighing it
   WeightedPoints& select(const TsdfObservation& observation, const Pose2& T_base_sensor, const TsdfGrid& grid,
                          std::uint32_t next_sequence, const Pose2& T_local_before, const Pose2& T_step, double dt_s);
+  /// Share of the view's columns that the last selection stands for.
+  double coverage() const { return coverage_; }
 
  private:
   enum class Come { kNo, kPerhaps, kYes };
@@ -34,6 +36,7 @@ class ReadingSelection {
   FilterConfig config_;
   MotionModelConfig motion_;
   WeightedPoints points_, doubtful_;
+  double coverage_ = 0.0;
 };
 
 }  // namespace knav

@@ -61,6 +61,27 @@ TEST(FloorPlan, WhatStandsInTheOnlyDoorCutsTheHouseInTwo) {
   EXPECT_TRUE(plan.connected({{1, 1}, {2, 2}}, {in_the_door}));
 }
 
+TEST(FloorPlan, AStartOutsideIsMovedIntoTheLargestPartOfTheBuilding) {
+  const std::string house = kHouse;
+  const auto started_at = [&](const std::string& spawn) {
+    std::string text = house;
+    text.replace(text.find("spawn: [1, 1, 0]"), 16, "spawn: " + spawn);
+    return started_inside(parse_world(text, "house.yaml"), 0.2).spawn;
+  };
+  EXPECT_EQ(started_at("[1, 1, 0]").x_m, 1.0);  // inside already
+  // The rooms are one part through the open door; there is room for a metre and a half round some points of either.
+  const Pose2 moved = started_at("[-0.5, -0.5, 90]");
+  const FloorPlan plan(parse_world(house, "house.yaml"), 0.2);
+  EXPECT_GE(plan.clearance_m({moved.x_m, moved.y_m}), 1.4);
+  EXPECT_FALSE(plan.path({1, 1}, {moved.x_m, moved.y_m}).empty());
+  EXPECT_NEAR(moved.yaw_rad, 0.5 * kPi, 1e-9);
+  const WorldConfig open_ground = parse_world("walls: [{points: [[0, 0], [5, 0], [5, 5]]}]\nspawn: [2, 3, 0]", "walls.yaml");
+  EXPECT_THROW(started_inside(open_ground, 0.2), UserError);
+  // Whoever names places knows where the robot starts.
+  const WorldConfig known = parse_world("walls: [{points: [[0, 0], [5, 0], [5, 5]]}]\nspawn: [2, 3, 0]\nplaces: {a: [1, 4, 0]}", "walls.yaml");
+  EXPECT_EQ(started_inside(known, 0.2).spawn.x_m, 2.0);
+}
+
 TEST_F(InAFolder, ALayoutIsReadByTheBenchmarkAndLeavesEveryPlaceReachable) {
   const std::string house = write("house.yaml", kHouse);
   const WorldConfig world = load_world(house);

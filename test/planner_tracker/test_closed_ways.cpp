@@ -103,7 +103,7 @@ TEST_F(TwoDoors, AWayFoundShutMustBeWiderThanTheRobotToTurnBackFor) {
   look(0.0, config_.planning.hold_s + 1.5);
   ASSERT_TRUE(goes_round());
   for (double t = 10.0; t < 20.0; t += 1.0) {
-    look(0.65, t);  // hardly wider than the robot needs, in cells of 5 cm
+    look(0.5, t);  // hardly wider than the robot needs
     EXPECT_TRUE(goes_round()) << t;
     look(0.0, t + 0.5);
     EXPECT_TRUE(goes_round()) << t;
@@ -113,7 +113,7 @@ TEST_F(TwoDoors, AWayFoundShutMustBeWiderThanTheRobotToTurnBackFor) {
 }
 
 TEST_F(TwoDoors, ANarrowWayThatWasNeverFoundShutIsTaken) {
-  look(0.65, 1.0);
+  look(0.5, 1.0);
   EXPECT_FALSE(goes_round());
 }
 

@@ -1,0 +1,73 @@
+// How far alignment may lead from odometry where little is in view. By hand.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tsdf_local_mapper/odometry_bound.h"
+
+namespace knav {
+namespace {
+
+constexpr double kFrame_s = 0.1;
+
+/// Odometry turns by 0.02 rad a frame for 2 s, 0.4 rad in all; the estimate does not turn at all.
+Pose2 after_a_turn(const OdometryBoundConfig& config, double coverage) {
+  MotionModelConfig motion;
+  motion.rotation_per_rotation = 0.1;
+  OdometryBound bound(config, motion);
+  Pose2 T_local_base;
+  for (int i = 0; i <= 20; ++i) {
+    const Pose2 T_odom_base{0.0, 0.0, 0.02 * i};
+    T_local_base = Pose2{};
+    bound.bound(10.0 + kFrame_s * i, T_odom_base, coverage, &T_local_base);
+  }
+  return T_local_base;
+}
+
+TEST(OdometryBound, WithLittleInViewTheEstimateStaysWithinSoManyDeviationsOfOdometry) {
+  // At half the coverage, 1 of the 2 deviations: 0.1 x 0.4 rad, and the 0.0035 rad that the grid resolves.
+  EXPECT_NEAR(after_a_turn({}, 0.25).yaw_rad, 0.4 - 0.04 - 0.0035, 1e-9);
+  EXPECT_NEAR(after_a_turn({}, 0.0).yaw_rad, 0.4 - 0.0035, 1e-9);
+}
+
+TEST(OdometryBound, WithEnoughInViewAlignmentDecides) {
+  EXPECT_EQ(after_a_turn({}, 0.5).yaw_rad, 0.0);
+  OdometryBoundConfig off;
+  off.coverage = 0.0;
+  EXPECT_EQ(after_a_turn(off, 0.0).yaw_rad, 0.0);
+}
+
+TEST(OdometryBound, IsMeasuredOverTheWindowAndNotFrameByFrame) {
+  // Wheels 5 % too large, straight on: within 2 x 0.1 m/m at full coverage's edge, so nothing is drawn, however long it lasts.
+  MotionModelConfig motion;
+  motion.translation_per_translation = 0.1;
+  OdometryBound bound({}, motion);
+  for (int i = 0; i <= 300; ++i) {
+    Pose2 T_local_base{0.019 * i, 0.0, 0.0};
+    EXPECT_FALSE(bound.bound(10.0 + kFrame_s * i, {0.02 * i, 0.0, 0.0}, 0.49, &T_local_base)) << i;
+  }
+}
+
+TEST(OdometryBound, DrawsAlongAndAcross) {
+  MotionModelConfig motion;
+  motion.translation_per_translation = 0.1;
+  OdometryBound bound({}, motion);
+  Pose2 T_local_base;
+  bound.bound(10.0, {}, 0.25, &T_local_base);
+  // Odometry: 1 m ahead. The estimate: 0.5 m back and 1.2 m aside of that, 1.3 m off; 0.1 x 1 m and 5 mm are allowed.
+  T_local_base = {0.5, 1.2, 0.0};
+  EXPECT_TRUE(bound.bound(11.0, {1.0, 0.0, 0.0}, 0.25, &T_local_base));
+  EXPECT_NEAR(std::hypot(T_local_base.x_m - 1.0, T_local_base.y_m), 0.105, 1e-9);
+  EXPECT_NEAR(std::atan2(T_local_base.y_m, T_local_base.x_m - 1.0), std::atan2(1.2, -0.5), 1e-9);
+}
+
+TEST(OdometryBound, ARateAboveItsRingsOnlyShortensTheWindow) {
+  OdometryBound bound({}, {});
+  for (int i = 0; i < 5000; ++i) {
+    Pose2 T_local_base{0.0001 * i, 0.0, 0.0};
+    EXPECT_FALSE(bound.bound(10.0 + 0.001 * i, {0.0001 * i, 0.0, 0.0}, 0.1, &T_local_base));
+  }
+}
+
+}  // namespace
+}  // namespace knav
