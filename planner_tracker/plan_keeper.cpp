@@ -13,7 +13,7 @@ constexpr double kOffPath_m = 0.5;
 constexpr double kNearestLook_m = 0.25;
 constexpr double kClosedRound_m = 0.6;   ///< what closes a way there belongs together
 constexpr double kSamePlace_m = 1.0;
-constexpr int kEnoughLooks = 2;
+constexpr int kEnoughLooks = 2;          ///< from different places, where there is no other way to be looked at
 constexpr double kAsGood_m = 0.15;       ///< so much farther off is as good a place to look from
 constexpr double kElsewhere_m = 0.6;     ///< another place to look from is this far from the last at least
 constexpr double kBeginning_m = 0.5;  ///< of a path, for its direction
@@ -154,6 +154,13 @@ const MapLayer& PlanKeeper::plan_unchanged(CombinedMap& map, const Point2& robot
   return *unchanged;
 }
 
+bool PlanKeeper::another_way(CombinedMap& map, const Point2& robot, const Point2& goal) {
+  std::vector<Point2> closed = closed_;
+  closed.push_back(at_);
+  planner_.plan(map.permissive(closed, kClosedRound_m), robot, goal, &result_);
+  return result_.code == PlanCode::kOk;
+}
+
 PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robot, const Point2& goal, double now_s,
                                        const std::vector<Point2>& moving) {
   switched_ = false;
@@ -220,7 +227,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     return Outcome::kStartBlocked;
   }
   // No way now. Would there be one, and where is it closed?
-  if (look_elsewhere_ && ++looks_ >= kEnoughLooks) {
+  if (look_elsewhere_ && (++looks_ >= kEnoughLooks || another_way(map, robot, goal))) {
     looks_ = 0;
     closed_.push_back(at_);
     // Another way to be looked at? If not, back to this one, from where it was not looked at last.

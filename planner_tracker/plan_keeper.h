@@ -73,6 +73,8 @@ class PlanKeeper {
   bool way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, double beyond_m, std::vector<Point2>* way);
   /// The unchanged map's best way that avoids what was looked at; the best of all if there is none.
   const MapLayer& plan_unchanged(CombinedMap& map, const Point2& robot, const Point2& goal);
+  /// Is there a way past what closes this one, if all else that closes the map went away?
+  bool another_way(CombinedMap& map, const Point2& robot, const Point2& goal);
   /// True if the blockage can be looked at from there.
   bool looks_at_it(const MapLayer& unchanged, const Point2& from) const;
 

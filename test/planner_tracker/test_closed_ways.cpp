@@ -112,6 +112,29 @@ TEST_F(TwoDoors, AWayFoundShutMustBeWiderThanTheRobotToTurnBackFor) {
   EXPECT_FALSE(goes_round());
 }
 
+TEST_F(TwoDoors, WhereBothAreShutOneLookAtTheNearOneIsEnoughAndTwoIfThereIsNoOther) {
+  const auto looked_at = [&](bool two_doors, int looks) {
+    OccupancyGrid map = rooms(1.0), seen = rooms(0.0);
+    fill(&seen, 5.95, 17.0, 6.05, 18.0, 100);
+    if (!two_doors) fill(&map, 5.95, 17.0, 6.05, 18.0, 100);
+    map_.set_global({}, map, {});
+    map_.set_local(seen, Pose2{});
+    PlanKeeper keeper(config_);
+    keeper.set_map(map_);
+    double at_s = 200.0;
+    EXPECT_EQ(keeper.replan(map_, {3.0, 3.0, 0.0}, {10.0, 3.0}, at_s, {}), PlanKeeper::Outcome::kToBlockage);
+    EXPECT_NEAR(keeper.at().y_m, 3.0, 0.3);
+    for (int i = 0; i < looks; ++i) {
+      keeper.look_elsewhere();
+      EXPECT_EQ(keeper.replan(map_, {3.0, 3.0, 0.0}, {10.0, 3.0}, at_s += 6.0, {}), PlanKeeper::Outcome::kToBlockage);
+    }
+    return keeper.at().y_m;
+  };
+  EXPECT_NEAR(looked_at(true, 1), 17.5, 0.3);
+  EXPECT_NEAR(looked_at(false, 1), 3.0, 0.3);
+  EXPECT_NEAR(looked_at(false, 2), 3.0, 0.3);  // back to it: there is no other
+}
+
 TEST_F(TwoDoors, ANarrowWayThatWasNeverFoundShutIsTaken) {
   look(0.5, 1.0);
   EXPECT_FALSE(goes_round());
