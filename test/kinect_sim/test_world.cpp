@@ -143,6 +143,25 @@ TEST(World, AnOccupancyImageBecomesWallsTheRightWayUp) {
               1e-9);  // above row 15's upper edge
 }
 
+TEST(World, OfAMapServersImageWhatNobodySawIsSolidUnlessAskedOtherwise) {
+  const std::string directory = testing::TempDir();
+  cv::Mat image(20, 20, CV_8UC1, cv::Scalar(205));
+  image(cv::Rect(5, 5, 10, 10)).setTo(254);
+  image.at<std::uint8_t>(10, 10) = 206;  // hardly seen, and free by map_server's free_thresh
+  cv::imwrite(directory + "/seen.png", image);
+  const std::string text = "occupancy: {image: seen.png, resolution_m: 0.5";
+  const CollisionMap solid(parse_world(text + "}\nspawn: [5, 5, 0]", "w", directory), 1.0);
+  EXPECT_NEAR(solid.clearance_m({2.9, 5.0}), 0.4, 1e-9);
+  EXPECT_GT(solid.clearance_m({5.25, 4.75}), 0.5);
+  EXPECT_NEAR(solid.clearance_m({1.0, 1.0}), 0.0, 1e-9);
+  const WorldConfig open = parse_world(text + ", occupied_below: 100}\nspawn: [5, 5, 0]", "w", directory);
+  EXPECT_TRUE(open.solids.empty());
+  // A start in what is solid is refused where a robot is to be driven, and not where one is looked for.
+  std::ofstream(directory + "/seen.yaml") << text << "}\nspawn: [1, 1, 0]\n";
+  EXPECT_THROW(load_world(directory + "/seen.yaml"), UserError);
+  EXPECT_EQ(load_world(directory + "/seen.yaml", StartMustBe::kAnywhere).spawn.x_m, 1.0);
+}
+
 TEST(World, ABaseWorldIsTakenOverAndAddedTo) {
   const std::string directory = testing::TempDir();
   std::ofstream(directory + "/base.yaml") << "places: {a: [1, 0, 0]}\nwalls: [{points: [[3, -1], [3, 1]]}]\n";
