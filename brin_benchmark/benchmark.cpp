@@ -169,6 +169,7 @@ RunRecord run_sequence(BenchmarkRobot& robot, const Pose2& T_map_start, const st
   result.walker_contacts = robot.simulator().contacts().walker_contacts;
   result.wall_s = seconds_since(wall_start);
   result.frame_cost_ms = robot.frame_cost_ms();
+  result.stage_cost_ms = robot.stage_cost_ms();
   result.frames_dropped = robot.frames_dropped();
   return record;
 }

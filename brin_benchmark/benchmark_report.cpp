@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "core/error.h"
 
 namespace knav {
@@ -15,6 +17,29 @@ nlohmann::json to_json(const Estimate& e) {
 
 std::string with_interval(const Estimate& e, int digits) {
   return fmt::format("{:.{}f} [{:.{}f}, {:.{}f}]", e.mean, digits, e.low, digits, e.high, digits);
+}
+
+/// The mean over the runs that know, each by its time; nothing if none does.
+std::string stage_table(const std::vector<RunResult>& runs) {
+  StageTable sum;
+  double time_s = 0.0, largest_ms = 0.0;
+  for (const RunResult& run : runs) {
+    if (run.stage_cost_ms.empty() || (!sum.empty() && run.stage_cost_ms.size() != sum.size())) continue;
+    if (sum.empty()) {
+      for (const auto& entry : run.stage_cost_ms) sum.emplace_back(entry.first, 0.0);
+    }
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i].second += run.time_s * run.stage_cost_ms[i].second;
+    time_s += run.time_s;
+    largest_ms = std::max(largest_ms, run.frame_cost_ms);
+  }
+  if (!(time_s > 0.0)) return "";
+  std::string text = "\n| the robot's work for a frame, on one core | mean |\n|---|---|\n";
+  double whole_ms = 0.0;
+  for (const auto& [stage, cost] : sum) {
+    text += fmt::format("| {} | {:.2f} ms |\n", stage, cost / time_s);
+    whole_ms += cost / time_s;
+  }
+  return text + fmt::format("| all (largest mean of a run: {:.1f} ms) | {:.1f} ms |\n", largest_ms, whole_ms);
 }
 
 }  // namespace
@@ -33,6 +58,8 @@ nlohmann::json to_json(const RunResult& run) {
     }
     legs.push_back(entry);
   }
+  nlohmann::json stages = nlohmann::json::array();  // in their order
+  for (const auto& [stage, cost_ms] : run.stage_cost_ms) stages.push_back({{"stage", stage}, {"ms", cost_ms}});
   nlohmann::json collisions = nlohmann::json::array();
   for (const Collision& c : run.collisions_at) collisions.push_back({{"time_s", c.time_s}, {"x_m", c.x_m}, {"y_m", c.y_m}});
   return {{"name", run.name},
@@ -43,6 +70,7 @@ nlohmann::json to_json(const RunResult& run) {
           {"distance_m", run.distance_m},
           {"wall_s", run.wall_s},
           {"frame_cost_ms", run.frame_cost_ms},
+          {"stage_cost_ms", stages},
           {"frames_dropped", run.frames_dropped},
           {"legs", legs}};
 }
@@ -60,6 +88,9 @@ RunResult run_from_json(const nlohmann::json& json, const std::string& file) {
     run.distance_m = json.at("distance_m");
     run.wall_s = json.at("wall_s");
     run.frame_cost_ms = json.at("frame_cost_ms");
+    for (const auto& entry : json.value("stage_cost_ms", nlohmann::json::array())) {
+      run.stage_cost_ms.emplace_back(entry.at("stage"), entry.at("ms"));
+    }
     run.frames_dropped = json.value("frames_dropped", 0.0);
     for (const auto& entry : json.at("legs")) {
       Leg leg;
@@ -137,6 +168,7 @@ std::string report_markdown(const std::vector<RunResult>& runs, const std::vecto
                     one.positioning_error_mean_m, one.positioning_error_max_m,
                     run.frame_cost_ms > 0.0 ? fmt::format("{:.1f} ms", run.frame_cost_ms) : "");
   }
+  text += stage_table(runs);
   for (const RunResult& run : runs) {
     if (run.frames_dropped <= kFramesMissed) continue;
     text += fmt::format("\n{}: {:.1f} % of the depth frames came too late to be rendered; the machine was too slow.\n",

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "brin_benchmark/flight_recorder.h"
+#include "brin_benchmark/stage_costs.h"
 #include "core/pose2.h"
 #include "core/trajectory.h"
 #include "kinect_sim/simulator.h"
@@ -41,6 +42,8 @@ class BenchmarkRobot {
 
   /// Of the stack's own work, a depth frame; 0 = not known.
   virtual double frame_cost_ms() const { return 0.0; }
+  /// The same by stage; empty = not known.
+  virtual StageTable stage_cost_ms() const { return {}; }
   /// Share of the depth frames that were not rendered in time.
   virtual double frames_dropped() const { return 0.0; }
 };

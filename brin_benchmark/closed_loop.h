@@ -40,6 +40,8 @@ class ClosedLoop {
 
   /// Of the robot's own work (all but the simulation), a frame.
   double frame_cost_ms() const { return frames_ > 0 ? 1e3 * stack_s_ / static_cast<double>(frames_) : 0.0; }
+  /// The same by stage.
+  StageTable stage_cost_ms() const { return stack_.costs().per_frame_ms(frames_); }
 
   /// The longest control step, planning included.
   double control_max_ms() const { return 1e3 * control_max_s_; }

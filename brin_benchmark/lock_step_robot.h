@@ -27,6 +27,7 @@ class LockStepRobot : public BenchmarkRobot {
   }
   std::string failure() const override { return loop_.stack().failure().reason; }
   double frame_cost_ms() const override { return loop_.frame_cost_ms(); }
+  StageTable stage_cost_ms() const override { return loop_.stage_cost_ms(); }
 
  private:
   ClosedLoop loop_;

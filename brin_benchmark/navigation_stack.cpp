@@ -78,29 +78,37 @@ void NavigationStack::add_odometry(double stamp_s, const Pose2& T_odom_base, dou
 
 void NavigationStack::add_depth(const cv::Mat& depth, const PinholeModel& camera, double stamp_s,
                                 const Eigen::Isometry3d& T_base_optical) {
-  if (!front_end_.process(depth, camera, stamp_s, T_base_optical, odometry_, &profile_)) return;
+  StageTimer timer(&costs_);
+  const bool usable = front_end_.process(depth, camera, stamp_s, T_base_optical, odometry_, &profile_);
+  timer.done(Stage::kFrontEnd);
+  if (!usable) return;
   const Pose2 T_base_camera = planar(T_base_optical);
   if (input_.localize_with == "scan") {
     Pose2 T_odom_base;
     if (odometry_.at(stamp_s, 1.0, 0.2, &T_odom_base) != PoseBuffer::Lookup::kOk) return;
     scan_from_profile(profile_, profile_config_, &scan_);
-    localize(T_base_camera, T_odom_base, odometry_epoch_, T_odom_base);
+    timer.done(Stage::kVirtualScan);
+    localize(T_base_camera, T_odom_base, odometry_epoch_, T_odom_base, &timer);
     if (!input_.local_map) return;
   }
   const LocalMapperResult& motion = mapper_.update(profile_, T_base_camera);
+  timer.done(Stage::kLocalMapper);
   if (!motion.accepted) return;
   if (input_.localize_with == "scan_360") {
     mapper_.extract_scan_360(&scan_);
-    localize(Pose2{}, motion.T_local_base, motion.epoch, motion.T_odom_base);
+    timer.done(Stage::kVirtualScan);
+    localize(Pose2{}, motion.T_local_base, motion.epoch, motion.T_odom_base, &timer);
   }
   if (!localized_ || !input_.local_map) return;
   mapper_.extract_local_map(&local_map_);
   planner_.set_local_map(local_map_, T_map_odom_ * motion.T_odom_base * motion.T_local_base.inverse());
+  timer.done(Stage::kLocalMap);
 }
 
 void NavigationStack::localize(const Pose2& T_base_sensor, const Pose2& T_local_base, std::uint32_t epoch,
-                               const Pose2& T_odom_base) {
+                               const Pose2& T_odom_base, StageTimer* timer) {
   const LocalizerResult& pose = localizer_.update(scan_, T_base_sensor, T_local_base, epoch, &T_odom_base);
+  timer->done(Stage::kLocalizer);
   planner_.set_scan(scan_, T_base_sensor);
   if (!pose.has_pose) return;
   localized_ = true;
@@ -117,7 +125,10 @@ Command NavigationStack::control(double now_s) {
   robot.w_radps = w_radps_;
   robot.localization = localization_state(verdict());
   robot.localization_stamp_s = localizer_.result().stamp_s;
-  return planner_.step(now_s, robot);
+  StageTimer timer(&costs_);
+  Command command = planner_.step(now_s, robot);
+  timer.done(Stage::kPlanner);
+  return command;
 }
 
 bool NavigationStack::estimate(Pose2* T_map_base) const {

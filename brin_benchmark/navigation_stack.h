@@ -5,6 +5,7 @@
 #include <string>
 
 #include "brin_benchmark/navigation_stack_config.h"
+#include "brin_benchmark/stage_costs.h"
 #include "core/camera_model.h"
 #include "core/pose_buffer.h"
 #include "depth_profile_nodelet/front_end.h"
@@ -57,10 +58,11 @@ class NavigationStack {
   const RangeScan& scan() const { return scan_; }
   const LocalizerResult& localization() const { return localizer_.result(); }
   const PlannerTracker& planner() const { return planner_; }
+  const StageCosts& costs() const { return costs_; }
 
  private:
   void localize(const Pose2& T_base_sensor, const Pose2& T_local_base, std::uint32_t epoch,
-                const Pose2& T_odom_base);
+                const Pose2& T_odom_base, StageTimer* timer);
 
   NavigationInputConfig input_;
   DepthProfileConfig profile_config_;
@@ -77,6 +79,7 @@ class NavigationStack {
   bool localized_ = false;
   std::uint32_t odometry_epoch_ = 0;  ///< the robot was set down elsewhere
   Pose2 T_map_odom_;
+  StageCosts costs_;
 };
 
 }  // namespace knav

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "brin_benchmark/stage_costs.h"
+
 namespace knav {
 
 /// One leg of the sequence.
@@ -31,6 +33,7 @@ struct RunResult {
   double time_s = 0.0, distance_m = 0.0;
   double wall_s = 0.0;         ///< what it cost
   double frame_cost_ms = 0.0;  ///< of the robot's own work, a frame; 0 = not known
+  StageTable stage_cost_ms;    ///< the same by stage; may be empty
   double frames_dropped = 0.0;  ///< share of the depth frames the simulator was too slow for
 };
 

@@ -78,6 +78,15 @@ TEST(Benchmark, RobotMapsARoomReachesItsWaypointsAndASecondSessionDrivesNothingA
     }
     EXPECT_EQ(runs[0].collisions, 0u);
     EXPECT_GT(runs[0].distance_m, 4.0);
+    // The stages are all of the robot's work but for the calls between them.
+    ASSERT_EQ(runs[0].stage_cost_ms.size(), kStages);
+    double sum_ms = 0.0;
+    for (const auto& [stage, cost_ms] : runs[0].stage_cost_ms) {
+      EXPECT_GT(cost_ms, 0.0) << stage;
+      sum_ms += cost_ms;
+    }
+    EXPECT_LE(sum_ms, runs[0].frame_cost_ms);
+    EXPECT_GT(sum_ms, 0.8 * runs[0].frame_cost_ms);
     write_report(options.out, runs, {"a test"});
   }
   for (const char* file :

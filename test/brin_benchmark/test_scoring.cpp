@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "brin_benchmark/benchmark_report.h"
@@ -61,8 +62,24 @@ TEST(Scoring, ARunComesBackFromItsFileAsItWas) {
   run.collisions = 2;
   run.wall_s = 7.5;
   run.collisions_at.push_back({12.5, 3.0, -4.0});
+  run.stage_cost_ms = {{"front end", 2.5}, {"mapper", 4.0}};
   const RunResult again = run_from_json(to_json(run), "run_01.json");
   EXPECT_EQ(to_json(again), to_json(run));
+}
+
+TEST(Report, StageCostsAreMeansOverTheRunsThatKnowThemWeighedByTheirTime) {
+  RunResult a = run_of({reached(10, 4, 0.125)}), b = a, old = a;
+  a.time_s = 10.0;
+  a.stage_cost_ms = {{"front end", 2.0}, {"mapper", 4.0}};
+  a.frame_cost_ms = 6.0;
+  b.time_s = 30.0;
+  b.stage_cost_ms = {{"front end", 4.0}, {"mapper", 4.0}};
+  b.frame_cost_ms = 8.0;
+  const std::string text = report_markdown({old, a, b}, {});
+  EXPECT_THAT(text, testing::HasSubstr("| front end | 3.50 ms |"));  // (10 x 2 + 30 x 4) / 40
+  EXPECT_THAT(text, testing::HasSubstr("| mapper | 4.00 ms |"));
+  EXPECT_THAT(text, testing::HasSubstr("largest mean of a run: 8.0 ms) | 7.5 ms |"));
+  EXPECT_THAT(report_markdown({old}, {}), testing::Not(testing::HasSubstr("for a frame")));
 }
 
 }  // namespace
