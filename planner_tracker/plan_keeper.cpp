@@ -18,6 +18,8 @@ constexpr double kAsGood_m = 0.15;       ///< so much farther off is as good a p
 constexpr double kElsewhere_m = 0.6;     ///< another place to look from is this far from the last at least
 constexpr double kBeginning_m = 0.5;  ///< of a path, for its direction
 constexpr double kStandsBefore_m = 0.6;  ///< what closes a way may reach this far before the point where it does
+constexpr double kAside_m = 4.0;         ///< of a detour, to look at a way straight and not from its side; a shut door seen from the side stays
+constexpr double kThrough_m = 0.5;       ///< beyond where it is closed, for a way's direction there
 constexpr int kDirections = 24;
 constexpr int kMostTried = 4;
 constexpr double kMovesThere_m = 1.0;  ///< of where the way is closed
@@ -83,6 +85,18 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   return true;
 }
 
+Point2 PlanKeeper::direction_beyond(const std::vector<Point2>& way, std::size_t segment, const Point2& p) {
+  Point2 at = p;
+  double left_m = kThrough_m;
+  for (std::size_t k = segment; k < way.size() && left_m > 0.0; ++k) {
+    const double length = std::hypot(way[k].x_m - at.x_m, way[k].y_m - at.y_m), share = std::min(1.0, left_m / std::max(1e-9, length));
+    at = {at.x_m + (way[k].x_m - at.x_m) * share, at.y_m + (way[k].y_m - at.y_m) * share};
+    left_m -= length;
+  }
+  const double length = std::max(1e-6, std::hypot(at.x_m - p.x_m, at.y_m - p.y_m));
+  return {(at.x_m - p.x_m) / length, (at.y_m - p.y_m) / length};
+}
+
 bool PlanKeeper::cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, std::vector<Point2>* way) {
   const double step = 0.5 * layer.geometry.resolution_m;
   std::vector<Point2> passed{way->front()};  // every step of the way before the blockage
@@ -97,6 +111,7 @@ bool PlanKeeper::cut_at_blockage(const MapLayer& layer, const MapLayer& unchange
         continue;
       }
       at_ = p;
+      through_ = direction_beyond(*way, i, p);
       std::size_t end = passed.size() - 1;
       const auto away_m = [&](std::size_t k) { return std::hypot(passed[k].x_m - p.x_m, passed[k].y_m - p.y_m); };
       while (end > 0 && away_m(end - 1) <= config_.planning.look_distance_m &&
@@ -121,7 +136,7 @@ bool PlanKeeper::looks_at_it(const MapLayer& unchanged, const Point2& from) cons
 bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, double beyond_m,
                              std::vector<Point2>* way) {
   std::vector<Point2> places;
-  for (const double share : {1.0, 1.25}) {
+  for (const double share : {0.92, 1.0, 1.25}) {
     for (int k = 0; k < kDirections; ++k) {
       const double angle = 2.0 * kPi * k / kDirections, r = share * config_.planning.look_distance_m;
       const double c = std::cos(angle), s = std::sin(angle);
@@ -134,7 +149,11 @@ bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, c
   }
   const auto away_m = [&](const Point2& p) { return std::hypot(p.x_m - robot.x_m, p.y_m - robot.y_m); };
   places.erase(std::remove_if(places.begin(), places.end(), [&](const Point2& p) { return away_m(p) < beyond_m; }), places.end());
-  std::sort(places.begin(), places.end(), [&](const Point2& a, const Point2& b) { return away_m(a) < away_m(b); });
+  const auto dear_m = [&](const Point2& p) {
+    const double x = at_.x_m - p.x_m, y = at_.y_m - p.y_m;
+    return away_m(p) + kAside_m * (1.0 - (x * through_.x_m + y * through_.y_m) / std::hypot(x, y));
+  };
+  std::sort(places.begin(), places.end(), [&](const Point2& a, const Point2& b) { return dear_m(a) < dear_m(b); });
   for (std::size_t i = 0; i < std::min<std::size_t>(kMostTried, places.size()); ++i) {
     planner_.plan(layer, robot, places[i], &result_);
     if (result_.code != PlanCode::kOk) continue;
@@ -256,6 +275,9 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     elsewhere_ = false;
     if (look_elsewhere_) {
       elsewhere_ = way_to_look(layer, unchanged, robot, kElsewhere_m, &way);
+    } else if (shut_.has(at_, now_s)) {
+      // Looked at already, on the way past or up to it.
+      elsewhere_ = way_to_look(layer, unchanged, robot, 0.0, &way);
     } else if (robot_too_near) {
       way_to_look(layer, unchanged, robot, 0.0, &way);
     }

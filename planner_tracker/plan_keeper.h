@@ -65,6 +65,9 @@ class PlanKeeper {
   /// True if the way round is to be left alone for now.
   bool hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& moving);
   void take(const std::vector<Point2>& path);
+  /// A way's direction beyond a point of its segment from way[segment - 1] to way[segment]. There it leads through what is
+  /// closed; before, it may come along the wall.
+  static Point2 direction_beyond(const std::vector<Point2>& way, std::size_t segment, const Point2& p);
   /// Finds where the layer closes a way of the unchanged map (at_), and keeps the way's beginning up to where the robot
   /// can look at that from look_distance_m, or nearer where corners hide it. False if the layer does not close it.
   bool cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, std::vector<Point2>* way);
@@ -93,6 +96,7 @@ class PlanKeeper {
   Point2 last_at_;
   std::vector<Point2> closed_;   ///< looked at on the way to this goal, and closed
   Point2 at_;
+  Point2 through_{1.0, 0.0};  ///< the direction of the way that is closed at at_
   bool switched_ = false;
   int switches_ = 0;
 };
