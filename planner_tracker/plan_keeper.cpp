@@ -67,12 +67,14 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
     held_for_somebody_ = false;
   }
   held_.advance(robot);
-  const double detour_m = result_.cost_m - held_.remaining_m();
-  if (held_.empty() || held_.offset_m() > kOffPath_m || detour_m < config_.planning.hold_detour_m) return false;
-  if (first) held_since_s_ = now_s;
+  if (held_.empty() || held_.offset_m() > kOffPath_m) return false;
   std::vector<Point2> way;
   held_.rest(&way);
   if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), &way)) return false;
+  if (!seen_shut_.has(at_, now_s)) seen_shut_.add(at_, now_s + config_.planning.closed_memory_s);
+  const double detour_m = result_.cost_m - held_.remaining_m();
+  if (detour_m < config_.planning.hold_detour_m) return false;
+  if (first) held_since_s_ = now_s;
   const auto there = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kMovesThere_m; };
   held_for_somebody_ = held_for_somebody_ || std::any_of(moving.begin(), moving.end(), there);
   const double worth_s = held_for_somebody_ ? config_.planning.hold_share * detour_m / config_.max_vel_x : 0.0;
@@ -275,7 +277,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     elsewhere_ = false;
     if (look_elsewhere_) {
       elsewhere_ = way_to_look(layer, unchanged, robot, kElsewhere_m, &way);
-    } else if (shut_.has(at_, now_s)) {
+    } else if (seen_shut_.has(at_, now_s)) {
       // Looked at already, on the way past or up to it.
       elsewhere_ = way_to_look(layer, unchanged, robot, 0.0, &way);
     } else if (robot_too_near) {

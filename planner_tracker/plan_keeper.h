@@ -38,6 +38,7 @@ class PlanKeeper {
     looks_ = 0;
     closed_.clear();
     shut_.clear();
+    seen_shut_.clear();
   }
   /// @param moving  points of the map at which something moves, see MovingCells
   Outcome replan(CombinedMap& map, const Pose2& robot, const Point2& goal, double now_s, const std::vector<Point2>& moving = {});
@@ -90,7 +91,8 @@ class PlanKeeper {
   Path held_, tried_;
   double held_since_s_ = -1.0;
   bool held_for_somebody_ = false;  ///< who moved there
-  ShutWays shut_;
+  ShutWays shut_;       ///< waited for in vain
+  ShutWays seen_shut_;  ///< at all
   bool look_elsewhere_ = false, elsewhere_ = false;
   int looks_ = 0;                ///< at the present blockage, in vain
   Point2 last_at_;
