@@ -11,7 +11,7 @@ constexpr double kArrived_m = 0.15;
 constexpr double kFacing_rad = 0.2;
 constexpr double kStandsBefore_m = 0.8;    ///< what closes the way, and the robot's radius, reach this far before the point
 constexpr double kEnoughFarther_m = 0.15;  ///< less is not worth backing up for
-constexpr double kLongEnough_s = 5.0;      ///< looked from one place
+constexpr double kLongEnough_s = 3.0;      ///< looked from one place: what has gone is gone from the map within 1 s of being seen
 constexpr double kFreeBehind_m = 0.25;
 constexpr double kJustDriven_s = 12.0, kBesideTrack_m = 0.1;
 
