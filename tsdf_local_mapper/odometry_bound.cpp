@@ -6,7 +6,7 @@
 namespace knav {
 namespace {
 
-constexpr std::size_t kEntries = 1024;                       // of a window; at a higher rate it is shorter
+constexpr std::size_t kEntries = 1024;                   // of a window; at a higher rate it is shorter
 constexpr double kLeast_m = 0.005, kLeast_rad = 0.0035;  // what the grid resolves
 
 }  // namespace
