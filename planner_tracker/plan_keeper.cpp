@@ -71,7 +71,7 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   std::vector<Point2> way;
   held_.rest(&way);
   if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), &way)) return false;
-  if (!seen_shut_.has(at_, now_s)) seen_shut_.add(at_, now_s + config_.planning.closed_memory_s);
+  if (!seen_shut_.has(at_, kSamePlace_m, now_s)) seen_shut_.add(at_, now_s + config_.planning.closed_memory_s);
   const double detour_m = result_.cost_m - held_.remaining_m();
   if (detour_m < config_.planning.hold_detour_m) return false;
   if (first) held_since_s_ = now_s;
@@ -88,13 +88,11 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
 }
 
 Point2 PlanKeeper::direction_beyond(const std::vector<Point2>& way, std::size_t segment, const Point2& p) {
-  Point2 at = p;
-  double left_m = kThrough_m;
-  for (std::size_t k = segment; k < way.size() && left_m > 0.0; ++k) {
-    const double length = std::hypot(way[k].x_m - at.x_m, way[k].y_m - at.y_m), share = std::min(1.0, left_m / std::max(1e-9, length));
-    at = {at.x_m + (way[k].x_m - at.x_m) * share, at.y_m + (way[k].y_m - at.y_m) * share};
-    left_m -= length;
-  }
+  std::vector<Point2> rest{p};
+  rest.insert(rest.end(), way.begin() + static_cast<std::ptrdiff_t>(segment), way.end());
+  Path beyond;
+  beyond.set(rest);
+  const Point2 at = beyond.point_at(kThrough_m);
   const double length = std::max(1e-6, std::hypot(at.x_m - p.x_m, at.y_m - p.y_m));
   return {(at.x_m - p.x_m) / length, (at.y_m - p.y_m) / length};
 }
@@ -277,7 +275,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     elsewhere_ = false;
     if (look_elsewhere_) {
       elsewhere_ = way_to_look(layer, unchanged, robot, kElsewhere_m, &way);
-    } else if (seen_shut_.has(at_, now_s)) {
+    } else if (seen_shut_.has(at_, kSamePlace_m, now_s)) {
       // Looked at already, on the way past or up to it.
       elsewhere_ = way_to_look(layer, unchanged, robot, 0.0, &way);
     } else if (robot_too_near) {

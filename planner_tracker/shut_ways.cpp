@@ -5,13 +5,12 @@
 
 namespace knav {
 namespace {
-constexpr double kSame_m = 1.0;
 constexpr double kRound_m = 1.5;  ///< what closes a corridor leaves gaps on either side of it: they belong together
 }  // namespace
 
-bool ShutWays::has(const Point2& at, double now_s) const {
+bool ShutWays::has(const Point2& at, double round_m, double now_s) const {
   return std::any_of(shut_.begin(), shut_.end(), [&](const Shut& s) {
-    return now_s <= s.until_s && std::hypot(s.at.x_m - at.x_m, s.at.y_m - at.y_m) < kSame_m;
+    return now_s <= s.until_s && std::hypot(s.at.x_m - at.x_m, s.at.y_m - at.y_m) < round_m;
   });
 }
 

@@ -13,7 +13,8 @@ class ShutWays {
  public:
   void clear() { shut_.clear(); }
   void add(const Point2& at, double until_s) { shut_.push_back({at, until_s}); }
-  bool has(const Point2& at, double now_s) const;
+  /// True if a place within `round_m` of this one was found closed.
+  bool has(const Point2& at, double round_m, double now_s) const;
   /// True if the path leads past a place that was found closed, and is no wider there than `clear_m` on either side.
   bool barely_open(const MapLayer& layer, const std::vector<Point2>& path, double clear_m, double now_s);
 

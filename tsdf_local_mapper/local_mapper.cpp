@@ -255,11 +255,15 @@ void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, 
     }
   }
   Pose2 T_local_base = filter.mean();
-  if (odometry_bound.bound(result.stamp_s, result.T_odom_base, readings.coverage(), &T_local_base)) {
-    filter.shift(filter.mean().inverse() * T_local_base);
-  }
+  MotionNoise odometry_sd;
+  const bool drawn = odometry_bound.bound(result.stamp_s, result.T_odom_base, readings.coverage(), &T_local_base, &odometry_sd);
+  if (drawn) filter.shift(filter.mean().inverse() * T_local_base);
   result.T_local_base = filter.mean();
   result.covariance = filter.covariance();
+  if (drawn) {
+    // The particles agree on what is not believed.
+    result.covariance.diagonal() += Eigen::Vector3d(odometry_sd.forward_m, odometry_sd.sideways_m, odometry_sd.turn_rad).cwiseAbs2();
+  }
   result.covariance.diagonal() += Eigen::Vector3d(1e-6, 1e-6, 1e-6);  // what a cell's 8 bits resolve
   if (!enough || result.outcome == FrameOutcome::kStarted) return;
   view_check.update(grid, observation, result.T_local_base * T_base_sensor, dt_s);

@@ -14,14 +14,13 @@ constexpr double kLeast_m = 0.005, kLeast_rad = 0.0035;  // what the grid resolv
 OdometryBound::OdometryBound(const OdometryBoundConfig& config, const MotionModelConfig& motion)
     : config_(config), motion_(motion), ring_(kEntries) {}
 
-bool OdometryBound::draw(const Entry& then, double coverage, Entry* now) const {
+bool OdometryBound::draw(const Entry& then, double coverage, Entry* now, MotionNoise* odometry_sd) const {
   const double driven_m = now->driven_m - then.driven_m, turned_rad = now->turned_rad - then.turned_rad;
   // A wheel's wrong radius is wrong in every step: the errors of the window's steps add up as they are.
+  const double sd_m = motion_.translation_per_translation * driven_m + motion_.translation_per_rotation * turned_rad;
+  const double sd_rad = motion_.rotation_per_translation * driven_m + motion_.rotation_per_rotation * turned_rad;
   const double k = config_.sds * coverage / config_.coverage;
-  const double most_m =
-      k * (motion_.translation_per_translation * driven_m + motion_.translation_per_rotation * turned_rad) + kLeast_m;
-  const double most_rad =
-      k * (motion_.rotation_per_translation * driven_m + motion_.rotation_per_rotation * turned_rad) + kLeast_rad;
+  const double most_m = k * sd_m + kLeast_m, most_rad = k * sd_rad + kLeast_rad;
   const Pose2 T_local_expected = then.T_local_base * (then.T_odom_base.inverse() * now->T_odom_base);
   Pose2 T_expected_base = T_local_expected.inverse() * now->T_local_base;
   const double off_m = std::hypot(T_expected_base.x_m, T_expected_base.y_m);
@@ -30,10 +29,12 @@ bool OdometryBound::draw(const Entry& then, double coverage, Entry* now) const {
   const double share = off_m > most_m ? most_m / off_m : 1.0;
   T_expected_base = {T_expected_base.x_m * share, T_expected_base.y_m * share, std::clamp(off_rad, -most_rad, most_rad)};
   now->T_local_base = T_local_expected * T_expected_base;
+  *odometry_sd = {sd_m + kLeast_m, sd_m + kLeast_m, sd_rad + kLeast_rad};
   return true;
 }
 
-bool OdometryBound::bound(double stamp_s, const Pose2& T_odom_base, double coverage, Pose2* T_local_base) {
+bool OdometryBound::bound(double stamp_s, const Pose2& T_odom_base, double coverage, Pose2* T_local_base,
+                          MotionNoise* odometry_sd) {
   if (config_.coverage <= 0.0) return false;
   Entry now{stamp_s, T_odom_base, *T_local_base, 0.0, 0.0};
   bool drawn = false;
@@ -46,7 +47,7 @@ bool OdometryBound::bound(double stamp_s, const Pose2& T_odom_base, double cover
       first_ = (first_ + 1) % ring_.size();
       --size_;
     }
-    drawn = coverage < config_.coverage && draw(at(0), coverage, &now);
+    drawn = coverage < config_.coverage && draw(at(0), coverage, &now, odometry_sd);
   }
   if (size_ == ring_.size()) {
     first_ = (first_ + 1) % ring_.size();

@@ -36,7 +36,8 @@ class OdometryBound {
   /// @param coverage      share of the view in [0, 1] that the readings cover which have a say
   /// @param T_local_base  the aligned estimate; drawn towards what odometry says of the last window_s if the two differ by
   /// more than the bound, and then the answer is true
-  bool bound(double stamp_s, const Pose2& T_odom_base, double coverage, Pose2* T_local_base);
+  /// @param odometry_sd   set when the answer is true: how far odometry itself may be wrong over the window
+  bool bound(double stamp_s, const Pose2& T_odom_base, double coverage, Pose2* T_local_base, MotionNoise* odometry_sd);
 
  private:
   struct Entry {
@@ -45,7 +46,7 @@ class OdometryBound {
     double driven_m = 0.0, turned_rad = 0.0;  ///< since the start, all ways added up
   };
   const Entry& at(std::size_t i) const { return ring_[(first_ + i) % ring_.size()]; }
-  bool draw(const Entry& then, double coverage, Entry* now) const;
+  bool draw(const Entry& then, double coverage, Entry* now, MotionNoise* odometry_sd) const;
 
   OdometryBoundConfig config_;
   MotionModelConfig motion_;

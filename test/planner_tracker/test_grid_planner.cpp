@@ -92,17 +92,19 @@ TEST(GridPlanner, NeverThroughAWallOrUnknownAndNearTheShortestOnRandomGrids) {
       ASSERT_EQ(plan.code == PlanCode::kOk, std::isfinite(reference)) << "seed " << seed << " pair " << pair;
       if (plan.code != PlanCode::kOk) continue;
       expect_safe(f.map.combined(), plan.path, f.config.hard_radius_m());
+      // Preferring clearance makes it longer than the shortest, but not by much: than the shortest that leaves half a cell more
+      // than the hard clearance, as a passage that is barely wide enough is gone round where that costs less.
+      const double roomy = theta_star_length_m(f.map.combined(), f.config.hard_radius_m() + 0.025, a, b);
+      if (!std::isfinite(roomy)) continue;
       ++reached;
-      // Preferring clearance makes it longer than the shortest at the hard clearance, but not by much.
-      const double ratio = plan.length_m / reference;
+      const double ratio = plan.length_m / roomy;
       sum += ratio;
       worst = std::max(worst, ratio);
     }
   }
   ASSERT_GT(reached, 30);
-  EXPECT_LT(sum / reached, 1.10);  // measured: 1.057
-  // Round a passage that is barely wide enough, where that costs less: a metre in there costs 1 + price.
-  EXPECT_LT(worst, 1.0 + ClearanceConfig{}.price);
+  EXPECT_LT(sum / reached, 1.04);
+  EXPECT_LT(worst, 1.30);
 }
 
 TEST(GridPlanner, WithoutAPriceOnClearanceItIsWithin3PercentOfTheShortest) {

@@ -9,6 +9,7 @@ namespace knav {
 namespace {
 
 constexpr double kFrame_s = 0.1;
+MotionNoise sd;
 
 /// Odometry turns by 0.02 rad a frame for 2 s, 0.4 rad in all; the estimate does not turn at all.
 Pose2 after_a_turn(const OdometryBoundConfig& config, double coverage) {
@@ -19,7 +20,7 @@ Pose2 after_a_turn(const OdometryBoundConfig& config, double coverage) {
   for (int i = 0; i <= 20; ++i) {
     const Pose2 T_odom_base{0.0, 0.0, 0.02 * i};
     T_local_base = Pose2{};
-    bound.bound(10.0 + kFrame_s * i, T_odom_base, coverage, &T_local_base);
+    bound.bound(10.0 + kFrame_s * i, T_odom_base, coverage, &T_local_base, &sd);
   }
   return T_local_base;
 }
@@ -44,7 +45,7 @@ TEST(OdometryBound, IsMeasuredOverTheWindowAndNotFrameByFrame) {
   OdometryBound bound({}, motion);
   for (int i = 0; i <= 300; ++i) {
     Pose2 T_local_base{0.019 * i, 0.0, 0.0};
-    EXPECT_FALSE(bound.bound(10.0 + kFrame_s * i, {0.02 * i, 0.0, 0.0}, 0.49, &T_local_base)) << i;
+    EXPECT_FALSE(bound.bound(10.0 + kFrame_s * i, {0.02 * i, 0.0, 0.0}, 0.49, &T_local_base, &sd)) << i;
   }
 }
 
@@ -53,19 +54,20 @@ TEST(OdometryBound, DrawsAlongAndAcross) {
   motion.translation_per_translation = 0.1;
   OdometryBound bound({}, motion);
   Pose2 T_local_base;
-  bound.bound(10.0, {}, 0.25, &T_local_base);
+  bound.bound(10.0, {}, 0.25, &T_local_base, &sd);
   // Odometry: 1 m ahead. The estimate: 0.5 m back and 1.2 m aside of that, 1.3 m off; 0.1 x 1 m and 5 mm are allowed.
   T_local_base = {0.5, 1.2, 0.0};
-  EXPECT_TRUE(bound.bound(11.0, {1.0, 0.0, 0.0}, 0.25, &T_local_base));
+  EXPECT_TRUE(bound.bound(11.0, {1.0, 0.0, 0.0}, 0.25, &T_local_base, &sd));
   EXPECT_NEAR(std::hypot(T_local_base.x_m - 1.0, T_local_base.y_m), 0.105, 1e-9);
   EXPECT_NEAR(std::atan2(T_local_base.y_m, T_local_base.x_m - 1.0), std::atan2(1.2, -0.5), 1e-9);
+  EXPECT_NEAR(sd.forward_m, 0.105, 1e-9);  // one deviation of a metre, and what the grid resolves
 }
 
 TEST(OdometryBound, ARateAboveItsRingsOnlyShortensTheWindow) {
   OdometryBound bound({}, {});
   for (int i = 0; i < 5000; ++i) {
     Pose2 T_local_base{0.0001 * i, 0.0, 0.0};
-    EXPECT_FALSE(bound.bound(10.0 + 0.001 * i, {0.0001 * i, 0.0, 0.0}, 0.1, &T_local_base));
+    EXPECT_FALSE(bound.bound(10.0 + 0.001 * i, {0.0001 * i, 0.0, 0.0}, 0.1, &T_local_base, &sd));
   }
 }
 
