@@ -255,7 +255,14 @@ void merge_newest(const TsdfObservation& o, const Pose2& T_map_robot, RangeScan*
     const double py = static_cast<double>(o.direction_y[i] * o.range_m[i]);
     const double x = T_robot_sensor.x_m + c * px - s * py, y = T_robot_sensor.y_m + s * px + c * py;
     const double angle = std::atan2(y, x), range = std::hypot(x, y);
-    put(static_cast<std::ptrdiff_t>(std::lround((angle - scan->angle_min_rad) / increment)), range);
+    const auto own = static_cast<std::ptrdiff_t>(std::lround((angle - scan->angle_min_rad) / increment));
+    if (o.cut(i)) {
+      // The map knows where it begins, if it was seen from farther off.
+      if (!(scan->range_m[static_cast<std::size_t>(((own % rays) + rays) % rays)] < static_cast<float>(range))) put(own, range);
+      have_last = false;
+      continue;
+    }
+    put(own, range);
     const double gap = std::hypot(x - last_x, y - last_y);
     if (have_last && gap < 0.1 + 0.05 * std::min(range, last_range)) {
       // One surface: every ray between the two columns meets the line between their points.

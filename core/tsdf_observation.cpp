@@ -19,6 +19,8 @@ void resize(std::size_t columns, TsdfObservation* out) {
   out->any_standing = false;
   out->behind_limit.assign(columns, -1.0f);
   out->any_edge = false;
+  out->front_limit.assign(columns, 1.0f);
+  out->any_cut = false;
 }
 
 void set_truncation(const TruncationConfig& truncation, std::size_t i, TsdfObservation* out) {
@@ -153,6 +155,10 @@ void observation_from(const DepthProfile& profile, const ObservationLimits& limi
     out->free_to_m[i] = free ? to * stretch : -1.0f;
     if (free && !std::isnan(out->range_m[i]))
       out->free_to_m[i] = std::min(out->free_to_m[i], out->range_m[i]);
+    if (!free && height == HeightClass::kLow && out->standing[i] != 0 && limits.truncation.cut_front < 1.0) {
+      out->front_limit[i] = static_cast<float>(limits.truncation.cut_front);
+      out->any_cut = true;
+    }
   }
   set_edges(limits.truncation, out);
   set_clear(limits, out);

@@ -20,6 +20,7 @@ struct TruncationConfig {
   int behind_power = 4;
   double edge_width_m = 0.15;
   double edge_behind = 0.25;
+  double cut_front = 0.125;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -37,6 +38,9 @@ struct TruncationConfig {
              "DepthProfile: so near to an edge, beside which the view reaches on, a ray may leave a thing by its side: there a surface says "
              "less about what is behind it. 0 = the same everywhere (the paper's).");
     v.number("edge_behind", edge_behind, 0, 1, "", "Namely for this share of the truncation.");
+    v.number("cut_front", cut_front, 0, 1, "",
+             "DepthProfile: of a low thing before which no floor was seen the view's lower edge may have cut the front away: before what is "
+             "seen of it the reading counts for this share of the truncation only. 1 = all of it (the paper's).");
   }
   float at(float range_m) const {
     const float mu = static_cast<float>(base_m) + static_cast<float>(per_range_squared) * range_m * range_m;
@@ -66,6 +70,8 @@ struct TsdfObservation {
   int behind_power = 0;
   std::vector<float> behind_limit;              ///< where F is less, the column says nothing: -1, near an edge more
   bool any_edge = false;
+  std::vector<float> front_limit;               ///< where F is not less, the column says nothing: 1, at a low thing's cut front less
+  bool any_cut = false;
   /// -1: the surface is a low or a high thing (HeightClass), which leaves the view as the robot drives up to it; 0: not.
   std::vector<std::int32_t> standing;
   bool any_standing = false;
@@ -76,6 +82,8 @@ struct TsdfObservation {
 
   std::size_t columns() const { return range_m.size(); }
   int valid_ranges() const;
+  /// True if what the column's surface belongs to may begin nearer than it says.
+  bool cut(std::size_t column) const { return front_limit[column] < 1.0f; }
 };
 
 /// What of a frame is used.

@@ -33,7 +33,7 @@ inline Part part_of(const TsdfRules& rules, const TsdfObservation& o, std::size_
   Part part;
   const float eta = o.range_m[u] - d;  // NaN without a surface
   const float f = eta * o.inverse_truncation_per_m[u];
-  part.near_surface = f >= o.behind_limit[u] && f < 1.0f;
+  part.near_surface = f >= o.behind_limit[u] && f < o.front_limit[u];
   part.carved = !part.near_surface && d >= o.free_from_m[u] && d <= o.free_to_m[u];
   part.f = part.near_surface ? f : 1.0f;
   const float floor2 = rules.weight_range_floor_m * rules.weight_range_floor_m;
@@ -137,8 +137,9 @@ KNAV_AVX2 inline Part8 part_of8(const TsdfRules& rules, const TsdfObservation& o
   const __m256 eta = _mm256_sub_ps(_mm256_i32gather_ps(o.range_m.data(), u, 4), d);
   const __m256 f = _mm256_mul_ps(eta, _mm256_i32gather_ps(o.inverse_truncation_per_m.data(), u, 4));
   const __m256 behind_limit = o.any_edge ? _mm256_i32gather_ps(o.behind_limit.data(), u, 4) : _mm256_set1_ps(-1.0f);
+  const __m256 front_limit = o.any_cut ? _mm256_i32gather_ps(o.front_limit.data(), u, 4) : one;
   const __m256 near_surface =
-      _mm256_and_ps(_mm256_cmp_ps(f, behind_limit, _CMP_GE_OQ), _mm256_cmp_ps(f, one, _CMP_LT_OQ));
+      _mm256_and_ps(_mm256_cmp_ps(f, behind_limit, _CMP_GE_OQ), _mm256_cmp_ps(f, front_limit, _CMP_LT_OQ));
   const __m256 free_from = _mm256_i32gather_ps(o.free_from_m.data(), u, 4);
   const __m256 carved = _mm256_andnot_ps(
       near_surface,

@@ -63,13 +63,24 @@ void People::next_target(std::size_t i, double t_s) {
       return;
     }
     if (config.repeat == PersonConfig::Repeat::kLoop) {
-      next = 0;
+      next = (next + count) % count;
     } else {
       walk.direction = -walk.direction;
       next = static_cast<int>(walk.target) + walk.direction;
     }
   }
   walk.target = static_cast<std::size_t>(next);
+}
+
+void People::hold_up(std::size_t i, double dt_s, PersonState* me) {
+  Walk& walk = walks_[i];
+  me->speed_mps = 0.0;
+  walk.held_up_s += dt_s;
+  if (configs_[i].gives_way_s <= 0.0 || walk.held_up_s < configs_[i].gives_way_s) return;
+  walk.held_up_s = 0.0;
+  walk.direction = -walk.direction;
+  const auto count = static_cast<int>(configs_[i].path.size());
+  walk.target = static_cast<std::size_t>((static_cast<int>(walk.target) + walk.direction + count) % count);
 }
 
 void People::step_one(std::size_t i, double t_s, double dt_s, const Pose2& robot, double robot_v,
@@ -137,16 +148,17 @@ void People::step_one(std::size_t i, double t_s, double dt_s, const Pose2& robot
     }
   }
   if (!found) {
-    me.speed_mps = 0.0;
+    hold_up(i, dt_s, &me);
     return;
   }
   const Point2 next{here.x_m + config.speed_mps * dt_s * std::cos(chosen),
                     here.y_m + config.speed_mps * dt_s * std::sin(chosen)};
   const double next_gap = std::hypot(next.x_m - robot.x_m, next.y_m - robot.y_m) - touch;
   if (next_gap < kMinimumGap_m && next_gap < now_gap) {
-    me.speed_mps = 0.0;
+    hold_up(i, dt_s, &me);
     return;
   }
+  walk.held_up_s = 0.0;
   me.speed_mps = config.speed_mps;
   const double turn = normalize_angle_rad(chosen - me.T_world_person.yaw_rad);
   const double limit = 4.0 * dt_s;

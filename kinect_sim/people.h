@@ -41,11 +41,14 @@ class People {
     double stand_until_s = 0.0;
     double heading_rad = 0.0;
     double side = 0.0;  ///< the side last chosen to pass the robot, +1 left
+    double held_up_s = 0.0;
     bool finished = false;
   };
   void step_one(std::size_t i, double t_s, double dt_s, const Pose2& robot, double robot_v,
                 double robot_radius, std::vector<PersonState>* state);
   void next_target(std::size_t i, double t_s);
+  /// Stands before something for another dt_s.
+  void hold_up(std::size_t i, double dt_s, PersonState* me);
 
   std::vector<PersonConfig> configs_;
   std::vector<Walk> walks_;

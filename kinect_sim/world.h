@@ -37,6 +37,7 @@ struct PersonConfig {
   Repeat repeat = Repeat::kBackAndForth;
   double speed_mps = 1.0, start_s = 0.0, radius_m = 0.25, height_m = 1.75;
   bool polite = true;  ///< walks round the robot; if not, just stops before it
+  double gives_way_s = 0.0;  ///< who has stood before something for so long walks back the way he came; 0: never
 };
 
 /// An axis-aligned rectangle of the floor.

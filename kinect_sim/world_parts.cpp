@@ -197,6 +197,7 @@ PersonConfig read_person(YamlMap& map) {
   person.radius_m = map.number("radius_m", 0.1, 1, 0.25);
   person.height_m = map.number("height_m", 0.5, 2.5, 1.75);
   person.polite = map.flag("polite", true);
+  person.gives_way_s = map.number("gives_way_s", 0, 1e6, 0.0);
   map.finish();
   return person;
 }

@@ -71,15 +71,19 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   std::vector<Point2> way;
   held_.rest(&way);
   if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), &way)) return false;
-  if (!seen_shut_.has(at_, kSamePlace_m, now_s)) seen_shut_.add(at_, now_s + config_.planning.closed_memory_s);
+  const double until_s = now_s + config_.planning.closed_memory_s;
+  if (!seen_shut_.has(at_, kSamePlace_m, now_s)) seen_shut_.add(at_, now_s, until_s);
   const double detour_m = result_.cost_m - held_.remaining_m();
-  if (detour_m < config_.planning.hold_detour_m) return false;
+  if (detour_m < config_.planning.hold_detour_m) {
+    shut_.add(at_, now_s, until_s);
+    return false;
+  }
   if (first) held_since_s_ = now_s;
   const auto there = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kMovesThere_m; };
   held_for_somebody_ = held_for_somebody_ || std::any_of(moving.begin(), moving.end(), there);
   const double worth_s = held_for_somebody_ ? config_.planning.hold_share * detour_m / config_.max_vel_x : 0.0;
   if (now_s - held_since_s_ > std::max(config_.planning.hold_s, worth_s)) {
-    shut_.add(at_, now_s + config_.planning.closed_memory_s);
+    shut_.add(at_, now_s, until_s);
     return false;
   }
   path_.set(way);

@@ -136,6 +136,7 @@ bool RangeErrors::compare(const TsdfObservation& o, std::size_t column, const Ei
   const double ty = o.direction_y[right] * o.range_m[right] - o.direction_y[left] * o.range_m[left];
   const double length = std::hypot(tx, ty);
   if (!(length > 0.0)) return false;  // a neighbour without a reading
+  if (o.cut(column)) return false;
   const double dx = o.direction_x[column], dy = o.direction_y[column];
   const double nx = -ty / length, ny = tx / length, square = nx * dx + ny * dy;
   if (std::fabs(square) < kMinSine) return false;

@@ -212,6 +212,35 @@ TEST_F(ContourTest, NewestProfileReplacesItsSection) {
   }
 }
 
+TEST_F(ContourTest, ALowThingWhoseFrontHasLeftTheViewDoesNotComeNoFarther) {
+  // The map's room, and a low thing before which no floor is seen: across what the map has 3 m ahead, and in a gap of it.
+  look(kRoom, {0.0, 0.0, 0.0});
+  DepthProfile profile;
+  profile.fx_px = 585;
+  profile.cx_px = 319.5;
+  profile.z_m.assign(640, 20.0f);
+  profile.free_from_m.assign(640, kNaN);
+  profile.free_to_m.assign(640, kNaN);
+  profile.height_class.assign(640, HeightClass::kLow);
+  RangeScan scan;
+  extract_contour(grid_, contour_, {}, 5.0f, &scan);
+  const RangeScan before = scan;
+  const auto merge = [&](float z_m) {
+    std::fill(profile.z_m.begin(), profile.z_m.end(), z_m);
+    TsdfObservation o;
+    observation_from(profile, ObservationLimits{}, &o);
+    o.T_map_sensor = {};
+    scan = before;
+    merge_newest(o, {}, &scan);
+  };
+  const std::size_t ahead = 1800;
+  ASSERT_TRUE(std::isfinite(before.range_m[ahead]));
+  merge(before.range_m[ahead] + 0.15f);
+  EXPECT_EQ(scan.range_m[ahead], before.range_m[ahead]);
+  merge(before.range_m[ahead] - 0.15f);
+  EXPECT_NEAR(scan.range_m[ahead], before.range_m[ahead] - 0.15f, 1e-3);
+}
+
 TEST(Contour, CrossingFreeBlocksAtOnceFindsWhatSingleStepsFind) {
   // A cluttered map, looked at from many places, half of them with the window scrolled so that the torus' seam lies in
   // view: every ray as cast_ray() finds it cell by cell.

@@ -254,6 +254,29 @@ TEST_F(BlindZone, APersonWhoLeftIsGoneAfterFourFrames) {
   EXPECT_EQ(grid_.standing_weight_units(20, 0), 0);
 }
 
+TEST_F(BlindZone, ALowThingsFrontStaysWhereItWasSeenWhenTheViewCutsItOff) {
+  // Its front lies 1.4 m ahead of where it is first seen from; from 0.5 m farther on its front has left the view, and what is left
+  // in it begins 15 cm behind the front.
+  for (const double cut_front : {TruncationConfig{}.cut_front, 1.0}) {
+    config_.truncation.cut_front = cut_front;
+    grid_ = TsdfGrid(config_, 6.0);
+    held_.clear();
+    add(1.4f, HeightClass::kLow, 30, 0.025);
+    ASSERT_NEAR(grid_.distance(28, 0), 0.0, 0.01);  // 1.425 m
+    add(1.05f, HeightClass::kLow, 60, 0.525);       // at 1.575 m: its cell is number 31
+    const bool stays = grid_.distance(28, 0) < 0.05 && grid_.distance(29, 0) < 0.0f;
+    EXPECT_EQ(stays, cut_front < 1.0) << "the front stays by `cut_front` alone; F there is " << grid_.distance(28, 0);
+    // Seen so for the first time it has a front, too: one cell that is freer than what it saw.
+    add(1.03f, HeightClass::kLow, 4, 1.525);  // at 2.555 m
+    EXPECT_GT(grid_.distance(50, 0), 0.0f);
+    EXPECT_LT(grid_.distance(51, 0), 0.0f);
+    EXPECT_EQ(grid_.known(49, 0), cut_front == 1.0);
+    for (const TsdfObservation& o : held_) grid_.remove(o);
+    EXPECT_EQ(grid_.weight_units(28, 0), 0);
+    EXPECT_EQ(grid_.weight_units(50, 0), 0);
+  }
+}
+
 TEST_F(BlindZone, WhoStepsCloseIsInTheMapBeforeTheCameraLosesHim) {
   // Half a minute of free space, seen from 1.5 m back, holds 900 frames against the few in which somebody comes up.
   for (const double appear_range_m : {TsdfConfig{}.appear_range_m, 0.0}) {
@@ -346,7 +369,7 @@ TEST(TsdfGrid, PlainAndVectorCodeGiveTheSameBytes) {
     DepthProfile profile = profile_of(std::vector<float>(57), 45.0);
     for (std::size_t i = 0; i < 57; ++i) {
       profile.z_m[i] = random.uniform() < 0.05 ? kNaN : static_cast<float>(wild ? random.uniform(0.3, 5.0) : wall_m);
-      profile.free_from_m[i] = 0.8f;
+      profile.free_from_m[i] = random.uniform() < 0.1 ? kNaN : 0.8f;
       profile.free_to_m[i] = static_cast<float>(wall_m);
       profile.height_class[i] = random.uniform() < 0.2 ? HeightClass::kLow : HeightClass::kMiddle;
     }

@@ -214,6 +214,23 @@ people: [{name: Ann, path: [[-4, 0], [4, 0]], repeat: once}]
   EXPECT_EQ(simulator.contacts().walker_contacts, 0u);
 }
 
+TEST(People, WalkBackFromWhatHoldsThemUpIfTheyGiveWay) {
+  const WorldConfig world = parse_world(R"(
+walls: [{points: [[-5, 0.4], [5, 0.4]]}, {points: [[-5, -0.4], [5, -0.4]]}]
+people: [{name: Ann, path: [[-3, 0], [0, 0], [4, 0]], repeat: loop, gives_way_s: 2}]
+)",
+                                        "corridor");
+  Simulator simulator(world, exact());
+  const auto until = [&](double s) {
+    while (simulator.stamp_s() - exact().start_time_s < s) simulator.step();
+    return simulator.people()[0].T_world_person.x_m;
+  };
+  // She looks a second ahead, and keeps 0.3 m from the robot: she stops 0.2 + 0.25 + 0.3 + 1 m before its middle.
+  EXPECT_NEAR(until(2.5), -1.75, 0.05);
+  EXPECT_NEAR(until(3.2), -1.75, 0.05);
+  EXPECT_LT(until(4.3), -2.6);
+}
+
 TEST(People, RunningIntoSomebodyIsTheRobotsCollision) {
   Simulator simulator(parse_world("people: [{name: Ann, path: [[1.5, 0]]}]", "field"), exact());
   drive(simulator, 0.5, 0.0, 5.0);

@@ -112,6 +112,25 @@ TEST_F(TwoDoors, AWayFoundShutMustBeWiderThanTheRobotToTurnBackFor) {
   EXPECT_FALSE(goes_round());
 }
 
+TEST_F(TwoDoors, AWayFoundShutTwiceIsNotTurnedBackForThoughItLooksOpen) {
+  // What leaves half a metre beside a wall looks open from 6 m and closed from 3 m: in Willow Garage the robot turned to and fro
+  // before it until its time was over.
+  double t = 0.0;
+  for (int time = 0; time < 2; ++time) {
+    EXPECT_FALSE(goes_round()) << time;
+    look(0.0, t += 1.0);
+    look(0.0, t += config_.planning.hold_s + 0.5);
+    ASSERT_TRUE(goes_round()) << time;
+    look(0.9, t += 10.0);
+  }
+  EXPECT_TRUE(goes_round());
+  const double found_s = t - 10.0;
+  look(0.9, found_s + config_.planning.closed_memory_s - 1.0);
+  EXPECT_TRUE(goes_round());
+  look(0.9, found_s + config_.planning.closed_memory_s + 1.0);
+  EXPECT_FALSE(goes_round());
+}
+
 TEST_F(TwoDoors, WhereBothAreShutOneLookAtTheNearOneIsEnoughAndTwoIfThereIsNoOther) {
   const auto looked_at = [&](bool two_doors, int looks) {
     OccupancyGrid map = rooms(1.0), seen = rooms(0.0);
