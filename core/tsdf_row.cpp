@@ -15,6 +15,9 @@ constexpr std::int8_t kFrontContrast = 76;  ///< by this much a cell must be fre
 /// A reading's own surface: not its hidden side, where a wall may end whose other face is seen from another room. A low
 /// thing that is seen along its edge shows itself at sharp angles only, so that its inside has to count.
 constexpr float kOwnBehind = -0.2f, kOwnBehindLow = -0.75f, kOwnFront = 0.3f;
+/// Rays that missed a low thing from afar, where it is not seen well, called it half free: so much less has to differ at its face.
+constexpr std::int8_t kLowContrast = 32;
+constexpr float kFaceBehindLow = -0.3f;
 
 std::int8_t value_of(std::int32_t weighted_sum, std::int32_t weight) {
   if (weight <= 0) return TsdfGrid::kUnknown;
@@ -71,10 +74,11 @@ inline bool contradicts(const TsdfRules& rules, const TsdfObservation& o, std::s
 inline bool appears(const TsdfRules& rules, const TsdfObservation& o, std::size_t u, float d, const Part& part,
                     std::int8_t held) {
   const bool low = o.standing[u] != 0;
+  const std::int8_t contrast = low && part.f >= kFaceBehindLow ? kLowContrast : kFrontContrast;
   return part.near_surface && d <= (low ? rules.low_appear_to_m : rules.appear_to_m) &&
          part.f >= (low ? kOwnBehindLow : kOwnBehind) && part.f <= kOwnFront &&
          held != TsdfGrid::kUnknown &&
-         static_cast<float>(held) - TsdfGrid::kValueScale * part.f > static_cast<float>(kFrontContrast);
+         static_cast<float>(held) - TsdfGrid::kValueScale * part.f > static_cast<float>(contrast);
 }
 
 inline void add_to_cell(const TsdfRules& rules, const TsdfObservation& o, const std::int32_t* column,
@@ -211,6 +215,7 @@ KNAV_AVX2 int add_to_cells_avx2(const TsdfRules& rules, const TsdfObservation& o
                                 TsdfChange* change, std::uint64_t* contradicted) {
   const __m256 age = _mm256_set1_ps(o.age_clock_s);
   const float appear_to_m = o.any_standing ? rules.low_appear_to_m : rules.appear_to_m;
+  const float appear_contrast = o.any_standing ? kLowContrast : kFrontContrast;
   int k = 0;
   for (; k + 8 <= count; k += 8) {
     const __m256i u = load8(column + k);
@@ -232,7 +237,7 @@ KNAV_AVX2 int add_to_cells_avx2(const TsdfRules& rules, const TsdfObservation& o
     const __m256i concerned = _mm256_or_si256(touched, _mm256_and_si256(part.before_free, seen));
     const __m256i gone = _mm256_and_si256(_mm256_andnot_si256(agrees, surface), concerned);
     const __m256i freer = _mm256_castps_si256(
-        _mm256_cmp_ps(contrast, _mm256_set1_ps(-static_cast<float>(kFrontContrast)), _CMP_LT_OQ));
+        _mm256_cmp_ps(contrast, _mm256_set1_ps(-appear_contrast), _CMP_LT_OQ));
     const __m256i near_enough =
         _mm256_castps_si256(_mm256_cmp_ps(d, _mm256_set1_ps(appear_to_m), _CMP_LE_OQ));
     const __m256i come =
