@@ -10,6 +10,9 @@ constexpr double kStep_m = 0.04;
 /// Of the hard clearance, what the tracker insists on: the rest is for the cells' size and the pose's noise.
 constexpr double kInsist = 0.6;
 constexpr double kNearEnd_m = 0.4;
+constexpr double kPast_m = 0.4;        ///< straight on, to be past what stands right beside the robot
+constexpr double kPastStep_rad = 0.1;
+constexpr double kTurned_rad = 0.03;
 
 }  // namespace
 
@@ -94,6 +97,18 @@ double PathTracker::speed_near_moving_mps(const TrackInput& input, const Rollout
   return slow + (config_.max_vel_x - slow) * share;
 }
 
+double PathTracker::bearing_past(const TrackInput& input, double bearing_rad) const {
+  // Not so far off the path that the robot would turn back to it first.
+  const double most = 0.85 * config_.tracking.turn_first_rad;
+  for (double off = kPastStep_rad; off < most; off += kPastStep_rad) {
+    for (const double side : {-1.0, 1.0}) {
+      const double past = bearing_rad + side * off;
+      if (straight_free_m(input, past, kPast_m) >= kPast_m) return past;
+    }
+  }
+  return 0.0;
+}
+
 TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
   const TrackingConfig& t = config_.tracking;
   const double share = std::clamp(input.v_mps / config_.max_vel_x, 0.0, 1.0);
@@ -154,6 +169,8 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
     }
   }
   if (ahead.free_m < 0.06 && reach > 0.06) {
+    const double past = bearing_past(input, bearing);
+    if (std::abs(past) > kTurned_rad) return turn(input, past);
     TrackOutput out = std::abs(bearing) > t.turned_rad ? turn(input, bearing) : stop(input);
     out.v_mps = 0.0;
     out.kind = TrackOutput::Kind::kBlocked;

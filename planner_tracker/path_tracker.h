@@ -63,6 +63,9 @@ class PathTracker {
   /// The same for a robot in this pose of its present frame: what a disc of the inscribed radius would need to have just
   /// as much room as the footprint has.
   double clearance_m(const TrackInput& input, double x_m, double y_m, double yaw_rad) const;
+  /// Where no arc from the robot's heading is free, as beside a corner that it touches all but: the heading next to the path's from
+  /// which it can go straight on past that; 0 if there is none.
+  double bearing_past(const TrackInput& input, double bearing_rad) const;
   /// What moves nearby allows.
   double speed_near_moving_mps(const TrackInput& input, const Rollout& ahead) const;
   /// True off the cells the map calls free. A robot that stands in the midst of unknown keeps clearance 0
