@@ -19,7 +19,7 @@ struct GridPlanner::Search {
   explicit Search(const PlannerTrackerConfig& c) : config(c) {}
 
   PlannerTrackerConfig config;
-  ClearancePrice price;
+  ClearancePrice price, keep_price;
   GridSearch coarse, fine;
   std::vector<Cell> cells, escape;
   std::vector<Point2> points;
@@ -72,6 +72,7 @@ bool GridPlanner::Search::apart(const MapLayer& layer, const Cell& a, const Cell
 void GridPlanner::set_map(const MapLayer& layer) {
   const PlannerTrackerConfig& c = search_->config;
   search_->price = ClearancePrice(layer, c.hard_radius_m(), c.preferred_radius_m(), c.clearance.price);
+  search_->keep_price = ClearancePrice(layer, c.keep_radius_m(), c.preferred_radius_m(), c.clearance.price);
   search_->label_parts(layer);
 }
 
@@ -200,8 +201,17 @@ double GridPlanner::segment_cost_m(const MapLayer& layer, const Point2& from, co
   return search_->shortener.segment_cost_m(layer, search_->price, from, to);
 }
 
+double GridPlanner::kept_cost_m(const MapLayer& layer, const Point2& from, const Point2& to) const {
+  return search_->shortener.segment_cost_m(layer, search_->keep_price, from, to);
+}
+
 bool GridPlanner::open(const MapLayer& layer, const Point2& point) const {
   return search_->price.open(
+      layer.squared_at(layer.geometry.cell_x(point.x_m), layer.geometry.cell_y(point.y_m)));
+}
+
+bool GridPlanner::kept_open(const MapLayer& layer, const Point2& point) const {
+  return search_->keep_price.open(
       layer.squared_at(layer.geometry.cell_x(point.x_m), layer.geometry.cell_y(point.y_m)));
 }
 

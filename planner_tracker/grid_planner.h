@@ -38,8 +38,12 @@ class GridPlanner {
 
   /// Cost [m] of driving straight, +Inf if something is in the way.
   double segment_cost_m(const MapLayer& layer, const Point2& from, const Point2& to) const;
+  /// The same of a way once taken, which may be a little narrower, see ClearanceConfig::keep.
+  double kept_cost_m(const MapLayer& layer, const Point2& from, const Point2& to) const;
   /// True if the robot can stand there.
   bool open(const MapLayer& layer, const Point2& point) const;
+  /// The same on a way once taken.
+  bool kept_open(const MapLayer& layer, const Point2& point) const;
   /// Nearest point where the robot can stand, within `within_m`; false if there is none.
   bool nearest_open(const MapLayer& layer, const Point2& point, double within_m, Point2* found) const;
 

@@ -7,8 +7,6 @@ namespace knav {
 namespace {
 
 constexpr double kStep_m = 0.04;
-/// Of the hard clearance, what the tracker insists on: the rest is for the cells' size and the pose's noise.
-constexpr double kInsist = 0.6;
 constexpr double kNearEnd_m = 0.4;
 constexpr double kPast_m = 0.4;        ///< straight on, to be past what stands right beside the robot
 constexpr double kPastStep_rad = 0.1;
@@ -19,7 +17,7 @@ constexpr double kTurned_rad = 0.03;
 PathTracker::PathTracker(const PlannerTrackerConfig& config)
     : config_(config),
       outline_(config.outline()),
-      margin_m_(kInsist * config.clearance.hard_m),
+      margin_m_(config.clearance.insist * config.clearance.hard_m),
       stop_radius_m_(outline_.inscribed_m() + margin_m_),
       hard_radius_m_(outline_.inscribed_m() + config.clearance.hard_m),
       preferred_radius_m_(outline_.inscribed_m() + config.clearance.preferred_m) {}

@@ -47,7 +47,7 @@ double PlanKeeper::old_cost_m(const MapLayer& layer, Path* path, const Point2& r
   path->rest(&rest_);
   double cost = path->offset_m();
   for (std::size_t i = 1; i < rest_.size(); ++i) {
-    cost += planner_.segment_cost_m(layer, rest_[i - 1], rest_[i]);
+    cost += strict_ ? planner_.segment_cost_m(layer, rest_[i - 1], rest_[i]) : planner_.kept_cost_m(layer, rest_[i - 1], rest_[i]);
     // The cells the robot stands in may be closed: it is on its way out of them.
     if (!std::isfinite(cost) && i == 1 && !planner_.open(layer, rest_[0])) cost = path->remaining_m();
   }
@@ -70,7 +70,7 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   if (held_.empty() || held_.offset_m() > kOffPath_m) return false;
   std::vector<Point2> way;
   held_.rest(&way);
-  if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), &way)) return false;
+  if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), !strict_, &way)) return false;
   const double until_s = now_s + config_.planning.closed_memory_s;
   if (!seen_shut_.has(at_, kSamePlace_m, now_s)) seen_shut_.add(at_, now_s, until_s);
   const double detour_m = result_.cost_m - held_.remaining_m();
@@ -101,7 +101,7 @@ Point2 PlanKeeper::direction_beyond(const std::vector<Point2>& way, std::size_t 
   return {(at.x_m - p.x_m) / length, (at.y_m - p.y_m) / length};
 }
 
-bool PlanKeeper::cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, std::vector<Point2>* way) {
+bool PlanKeeper::cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, bool kept, std::vector<Point2>* way) {
   const double step = 0.5 * layer.geometry.resolution_m;
   std::vector<Point2> passed{way->front()};  // every step of the way before the blockage
   for (std::size_t i = 1; i < way->size(); ++i) {
@@ -110,7 +110,7 @@ bool PlanKeeper::cut_at_blockage(const MapLayer& layer, const MapLayer& unchange
     for (double s = step; s < length + step; s += step) {
       const double share = std::min(1.0, s / length);
       const Point2 p{a.x_m + (b.x_m - a.x_m) * share, a.y_m + (b.y_m - a.y_m) * share};
-      if (planner_.open(layer, p) || passed.size() < 3) {
+      if ((kept ? planner_.kept_open(layer, p) : planner_.open(layer, p)) || passed.size() < 3) {
         passed.push_back(p);
         continue;
       }
@@ -187,6 +187,7 @@ bool PlanKeeper::another_way(CombinedMap& map, const Point2& robot, const Point2
 PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robot, const Point2& goal, double now_s,
                                        const std::vector<Point2>& moving) {
   switched_ = false;
+  strict_ = now_s < strict_until_s_;
   const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
   const MapLayer& layer = map.combined();
   Outcome kind = Outcome::kToGoal;
@@ -203,6 +204,17 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
       planner_.plan(layer, robot, nearby, &result_);
     }
   }
+  if (kind == Outcome::kToGoal && holding() && std::isfinite(old_cost_m(layer, &held_, robot))) {
+    // Open again: on as before.
+    path_ = held_;
+    path_kind_ = kind;
+    held_since_s_ = -1.0;
+  }
+  const bool no_new_way = result_.code == PlanCode::kNoPath || result_.code == PlanCode::kStartBlocked;
+  if (no_new_way && kind == Outcome::kToGoal && path_kind_ == kind && std::isfinite(old_cost_m(layer, &path_, robot))) {
+    elsewhere_ = look_elsewhere_ = false;
+    return kind;
+  }
   if (result_.code == PlanCode::kOk && kind == Outcome::kToNearby) {
     // Right beside it the floor under it is out of sight: whether it has gone is seen from farther off.
     std::vector<Point2> way;
@@ -218,11 +230,6 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     planner_.plan(layer, robot, nearby, &result_);
   }
   if (result_.code == PlanCode::kOk) {
-    if (holding() && kind == Outcome::kToGoal && std::isfinite(old_cost_m(layer, &held_, robot))) {
-      // Open again: on as before.
-      path_ = held_;
-      path_kind_ = kind;
-    }
     const double old = path_kind_ == kind ? old_cost_m(layer, &path_, robot) : kInfinite;
     const bool was_to_goal = kind == Outcome::kToGoal && (holding() || (path_kind_ == kind && !path_.empty()));
     if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s, moving)) return Outcome::kToBlockage;
@@ -264,7 +271,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     return Outcome::kNoPath;
   }
   std::vector<Point2> way = result_.path;
-  if (!cut_at_blockage(layer, unchanged, &way)) at_ = goal;
+  if (!cut_at_blockage(layer, unchanged, false, &way)) at_ = goal;
   const auto same_place = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kSamePlace_m; };
   if (!same_place(last_at_)) looks_ = 0;
   last_at_ = at_;

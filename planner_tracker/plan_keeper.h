@@ -48,6 +48,8 @@ class PlanKeeper {
   /// Where the robot looks at a closed way from has shown it nothing new: the next replan() leads it to another place, and after
   /// that to another way, if there is one: what closes that one may be gone when it is looked at.
   void look_elsewhere() { look_elsewhere_ = true; }
+  /// The way taken is too narrow after all: for closed_memory_s it is open only where a new one would be.
+  void too_narrow(double now_s) { strict_until_s_ = now_s + config_.planning.closed_memory_s; }
   /// True while path() leads from one place to look at a closed way from to another, or back to one already looked at.
   bool elsewhere() const { return elsewhere_; }
   /// True if the last replan() replaced the path by another.
@@ -71,7 +73,8 @@ class PlanKeeper {
   static Point2 direction_beyond(const std::vector<Point2>& way, std::size_t segment, const Point2& p);
   /// Finds where the layer closes a way of the unchanged map (at_), and keeps the way's beginning up to where the robot
   /// can look at that from look_distance_m, or nearer where corners hide it. False if the layer does not close it.
-  bool cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, std::vector<Point2>* way);
+  /// @param kept  the way was taken, and counts as open where it is a little narrower
+  bool cut_at_blockage(const MapLayer& layer, const MapLayer& unchanged, bool kept, std::vector<Point2>* way);
   /// A way to the nearest place from which the blockage can be looked at and that is farther than `beyond_m`, for a robot that
   /// stands too near to it or has seen nothing from where it stands.
   bool way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, double beyond_m, std::vector<Point2>* way);
@@ -90,6 +93,8 @@ class PlanKeeper {
   std::vector<Point2> rest_;
   Path held_, tried_;
   double held_since_s_ = -1.0;
+  double strict_until_s_ = -1.0;  ///< see too_narrow()
+  bool strict_ = false;
   bool held_for_somebody_ = false;  ///< who moved there
   ShutWays shut_;       ///< waited for in vain
   ShutWays seen_shut_;  ///< at all

@@ -19,6 +19,7 @@ std::vector<std::string> PlannerTrackerConfig::validate() const {
   if (clearance.preferred_m < clearance.hard_m) {
     faults.push_back("clearance/preferred_m must not be smaller than clearance/hard_m.");
   }
+  if (clearance.keep > clearance.insist) faults.push_back("clearance/keep must not be larger than clearance/insist.");
   if (clearance.free_threshold >= clearance.occupied_threshold) {
     faults.push_back("clearance/free_threshold must be smaller than clearance/occupied_threshold.");
   }

@@ -10,6 +10,8 @@ namespace knav {
 /// What the robot keeps away from, and how the maps are read.
 struct ClearanceConfig {
   double hard_m = 0.05;
+  double insist = 0.6;
+  double keep = 0.4;
   double preferred_m = 0.25;
   double price = 2.0;
   double escape_m = 1.0;
@@ -19,6 +21,11 @@ struct ClearanceConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v.number("hard_m", hard_m, 0, 1, "m", "Never nearer than this beyond the robot's radius.");
+    v.number("insist", insist, 0, 1, "",
+             "Of hard_m, what the tracker insists on, measured to the returns of scan_360: the rest is for the cells' size and the pose's noise.");
+    v.number("keep", keep, 0, 1, "",
+             "Of hard_m, what a way once taken must leave to count as open: in a lane just as wide as the robot needs, walls move by a cell from "
+             "one local map to the next.");
     v.number("preferred_m", preferred_m, 0, 1.5, "m",
              "Nearer than this beyond the radius costs extra and is slow.");
     v.number("price", price, 0, 50, "", "A metre of path that just keeps hard_m costs 1 + price metres.");
@@ -181,6 +188,8 @@ struct PlannerTrackerConfig {
   Footprint outline() const;
   /// The centre keeps this far from everything, whichever way the robot faces.
   double hard_radius_m() const { return outline().inscribed_m() + clearance.hard_m; }
+  /// ... and this far on a way once taken, see ClearanceConfig::keep.
+  double keep_radius_m() const { return outline().inscribed_m() + clearance.keep * clearance.hard_m; }
   /// ... and this far where there is room, so that it can face any way.
   double preferred_radius_m() const { return outline().circumscribed_m() + clearance.preferred_m; }
 

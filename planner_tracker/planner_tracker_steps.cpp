@@ -235,6 +235,7 @@ void PlannerTracker::State::drive(double now_s, const RobotState& robot) {
   if (out.kind == TrackOutput::Kind::kBlocked) {
     if (blocked_since_s < 0.0) blocked_since_s = now_s;
     blocked_at = out.obstacle;
+    if (now_s - blocked_since_s > 0.5 * config.planning.controller_patience) keeper.too_narrow(now_s);
     if (backing_up(now_s, robot, blocked_at)) return;
     act(Activity::kWaiting, out);
     return;

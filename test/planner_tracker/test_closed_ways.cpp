@@ -131,6 +131,47 @@ TEST_F(TwoDoors, AWayFoundShutTwiceIsNotTurnedBackForThoughItLooksOpen) {
   EXPECT_FALSE(goes_round());
 }
 
+TEST(ClosedWay, ALaneThatAWallsCellsNarrowStaysOpenForTheRobotOnItsWayThere) {
+  // A wall across a room, aslant: with these gaps on either side of the straight way the nearest of its cells is 0.22 m off, and a
+  // new way needs 0.25 m.
+  const auto gap = [](double above_cells, double below_cells) {
+    OccupancyGrid grid = room(8.0, 6.0);
+    const GridGeometry& g = grid.geometry;
+    for (const double side : {-1.0, 1.0}) {
+      for (double t = side > 0.0 ? above_cells : below_cells; t < 80.0; t += 0.25) {
+        const int ix = 80 + static_cast<int>(std::lround(side * t / std::sqrt(5.0)));
+        const int iy = 60 + static_cast<int>(std::lround(side * 2.0 * t / std::sqrt(5.0)));
+        for (const int y : {iy, iy + static_cast<int>(side)}) {
+          if (g.contains(ix, y)) grid.value[g.index(ix, y)] = 100;
+        }
+      }
+    }
+    return grid;
+  };
+  const OccupancyGrid wide = gap(9.0, 9.0), narrow = gap(4.5, 5.25), closed = gap(3.5, 3.5);
+  const PlannerTrackerConfig config;
+  CombinedMap map(config.preferred_radius_m() + 0.2, config.clearance.occupied_threshold, config.clearance.free_threshold);
+  map.set_global({}, wide, {});
+  PlanKeeper keeper(config);
+  keeper.set_map(map);
+  const Pose2 robot{2.0, 4.0, 0.0};
+  const Point2 goal{6.0, 2.0};
+  ASSERT_EQ(keeper.replan(map, robot, goal, 100.0), PlanKeeper::Outcome::kToGoal);
+  map.set_local(narrow, Pose2{});
+  PlanResult anew;
+  keeper.planner().plan(map.combined(), {2.0, 4.0}, goal, &anew);
+  ASSERT_EQ(anew.code, PlanCode::kNoPath);
+  EXPECT_EQ(keeper.replan(map, robot, goal, 101.0), PlanKeeper::Outcome::kToGoal);
+  map.set_local(closed, Pose2{});
+  EXPECT_EQ(keeper.replan(map, robot, goal, 102.0), PlanKeeper::Outcome::kToBlockage);
+  // The tracker, which measures to what the scan meets, has the last word.
+  map.set_local(wide, Pose2{});
+  ASSERT_EQ(keeper.replan(map, robot, goal, 103.0), PlanKeeper::Outcome::kToGoal);
+  map.set_local(narrow, Pose2{});
+  keeper.too_narrow(104.0);
+  EXPECT_EQ(keeper.replan(map, robot, goal, 104.0), PlanKeeper::Outcome::kToBlockage);
+}
+
 TEST_F(TwoDoors, WhereBothAreShutOneLookAtTheNearOneIsEnoughAndTwoIfThereIsNoOther) {
   const auto looked_at = [&](bool two_doors, int looks) {
     OccupancyGrid map = rooms(1.0), seen = rooms(0.0);
