@@ -140,7 +140,7 @@ int main(int argc, char** argv) {
                  "world of the mapping drive, e.g. config/worlds/brin_building.yaml");
   app.add_option("--changes", options.changes,
                  "sequence and changes of every run, e.g. config/worlds/brin_changes.yaml");
-  app.add_option("--config", options.config, "default, paper_full, paper_baseline, external (another stack, as ROS nodes), or a file")
+  app.add_option("--config", options.config, "default, paper_full, paper_baseline, paper_literal, external (another stack, as ROS nodes), or a file")
       ->default_str("default");
   app.add_option("--calibration", options.calibration, "depth calibration of the simulated Kinect");
   app.add_option("--sensor", options.sensor, "sensor preset of the simulator")->capture_default_str();

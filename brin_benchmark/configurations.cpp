@@ -23,12 +23,12 @@ fs::path shipped(const std::string& file) {
 std::string configuration_file(const std::string& name_or_path) {
   if (name_or_path.empty() || name_or_path == "default") return "";
   if (fs::exists(name_or_path)) return name_or_path;
-  for (const char* name : {"paper_full", "paper_baseline"}) {
+  for (const char* name : {"paper_full", "paper_baseline", "paper_literal"}) {
     if (name_or_path == name && fs::exists(shipped(name_or_path + ".yaml")))
       return shipped(name_or_path + ".yaml").string();
   }
   throw UserError(name_or_path +
-                  ": no such configuration; give default, paper_full, paper_baseline, external or a YAML file.");
+                  ": no such configuration; give default, paper_full, paper_baseline, paper_literal, external or a YAML file.");
 }
 
 }  // namespace knav

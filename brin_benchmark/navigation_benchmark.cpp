@@ -95,7 +95,7 @@ int main(int argc, char** argv) {
   app.add_option("--world", options.world, "world of the mapping drive, e.g. config/worlds/demo_goals.yaml");
   app.add_option("--tour", options.tour, "script of the mapping drive; laid out by itself if there is none");
   app.add_option("--map", options.map, "map directory of this building, its origin at the world's spawn; instead of a mapping drive");
-  app.add_option("--config", options.config, "default, paper_full, paper_baseline, or a file")->default_str("default");
+  app.add_option("--config", options.config, "default, paper_full, paper_baseline, paper_literal, or a file")->default_str("default");
   app.add_option("--calibration", options.calibration, "depth calibration of the simulated Kinect");
   app.add_option("--sensor", options.sensor, "sensor preset of the simulator")->capture_default_str();
   app.add_option("--odometry", options.odometry, "odometry preset of the simulator")->capture_default_str();

@@ -35,7 +35,7 @@ worst_to_mean_20_m. lost: some 20 m segment is more than 2 m off. scan: rays wit
 8 m; a false obstacle is a return 0.3 m and 5 % nearer than anything within 0.1 m beside its ray.)";
 
 struct Options {
-  std::string worlds = "config/worlds", cache, config, paper_config = "config/paper_full.yaml", json, trajectories;
+  std::string worlds = "config/worlds", cache, config, paper_config = "config/paper_literal.yaml", json, trajectories;
   std::vector<std::string> rows = {"calibrated", "driven", "harsh", "paper", "people"};
   int seeds = 10, first_seed = 1, mapper_seed = -1;
   bool quick = false, fresh = false, record_only = false, no_scans = false;

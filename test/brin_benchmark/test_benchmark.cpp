@@ -128,6 +128,7 @@ TEST(Configurations, ThePapersTwoRunsDifferInTheTwoKeysOnly) {
   EXPECT_EQ(different, (std::vector<std::string>{"/navigation/local_map", "/navigation/localize_with"}));
   // And both are good configurations.
   EXPECT_FALSE(NavigationStackConfig::from_file(configuration_file("paper_baseline")).input.local_map);
+  EXPECT_EQ(NavigationStackConfig::from_file(configuration_file("paper_literal")).local_mapper.filter.alignment_cost, "paper");
   EXPECT_EQ(configuration_file("default"), "");
   EXPECT_THROW(configuration_file("papper"), UserError);
 }
