@@ -22,6 +22,7 @@ constexpr double kAside_m = 4.0;    ///< of detour, to look at a way straight an
 constexpr double kThrough_m = 0.5;  ///< beyond where it is closed, for a way's direction there
 constexpr int kDirections = 24;
 constexpr int kMostTried = 4;
+constexpr double kUnhurried = 1.5;  ///< times as long as at full speed
 constexpr double kMovesThere_m = 1.0;  ///< of where the way is closed
 constexpr double kWider_m = 0.05;      ///< a way once found closed must be wider by this on either side to turn back for
 
@@ -78,11 +79,18 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
     shut_.add(at_, now_s, until_s);
     return false;
   }
-  if (first) held_since_s_ = now_s;
+  if (first) {
+    held_since_s_ = now_s;
+    // From afar a lane looks closed that is not: it is worth going there, unless that is as far as half of the way round.
+    Path to_see;
+    to_see.set(way);
+    const double to_see_m = to_see.length_m();
+    to_see_s_ = 2.0 * to_see_m < detour_m ? kUnhurried * to_see_m / config_.max_vel_x : 0.0;
+  }
   const auto there = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kMovesThere_m; };
   held_for_somebody_ = held_for_somebody_ || std::any_of(moving.begin(), moving.end(), there);
   const double worth_s = held_for_somebody_ ? config_.planning.hold_share * detour_m / config_.max_vel_x : 0.0;
-  if (now_s - held_since_s_ > std::max(config_.planning.hold_s, worth_s)) {
+  if (now_s - held_since_s_ > to_see_s_ + std::max(config_.planning.hold_s, worth_s)) {
     shut_.add(at_, now_s, until_s);
     return false;
   }
@@ -170,6 +178,13 @@ bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, c
 const MapLayer& PlanKeeper::plan_unchanged(CombinedMap& map, const Point2& robot, const Point2& goal) {
   const MapLayer* unchanged = &map.permissive(closed_, kClosedRound_m);
   planner_.plan(*unchanged, robot, goal, &result_);
+  if (result_.code != PlanCode::kOk && closed_.size() > 1) {
+    // All ways were looked at. What closed the others may have gone since.
+    looked_at_all_ = true;
+    closed_.erase(closed_.begin(), closed_.end() - 1);
+    unchanged = &map.permissive(closed_, kClosedRound_m);
+    planner_.plan(*unchanged, robot, goal, &result_);
+  }
   if (result_.code != PlanCode::kOk && !closed_.empty()) {
     unchanged = &map.permissive();
     planner_.plan(*unchanged, robot, goal, &result_);
@@ -293,7 +308,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
       way_to_look(layer, unchanged, robot, 0.0, &way);
     }
     look_elsewhere_ = false;
-    elsewhere_ = elsewhere_ || std::any_of(closed_.begin(), closed_.end(), same_place);
+    elsewhere_ = elsewhere_ || looked_at_all_ || std::any_of(closed_.begin(), closed_.end(), same_place);
     take(way);
   }
   path_kind_ = Outcome::kToBlockage;

@@ -36,6 +36,7 @@ class PlanKeeper {
     held_since_s_ = -1.0;
     elsewhere_ = look_elsewhere_ = false;
     looks_ = 0;
+    looked_at_all_ = false;
     closed_.clear();
     shut_.clear();
     seen_shut_.clear();
@@ -78,7 +79,8 @@ class PlanKeeper {
   /// A way to the nearest place from which the blockage can be looked at and that is farther than `beyond_m`, for a robot that
   /// stands too near to it or has seen nothing from where it stands.
   bool way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, double beyond_m, std::vector<Point2>* way);
-  /// The unchanged map's best way that avoids what was looked at; the best of all if there is none.
+  /// The unchanged map's best way that avoids what was looked at; if there is none, that avoids what was looked at last; the best of
+  /// all if there is none either.
   const MapLayer& plan_unchanged(CombinedMap& map, const Point2& robot, const Point2& goal);
   /// Is there a way past what closes this one, if all else that closes the map went away?
   bool another_way(CombinedMap& map, const Point2& robot, const Point2& goal);
@@ -92,7 +94,7 @@ class PlanKeeper {
   PlanResult result_;
   std::vector<Point2> rest_;
   Path held_, tried_;
-  double held_since_s_ = -1.0;
+  double held_since_s_ = -1.0, to_see_s_ = 0.0;
   double strict_until_s_ = -1.0;  ///< see too_narrow()
   bool strict_ = false;
   bool held_for_somebody_ = false;  ///< who moved there
@@ -102,6 +104,7 @@ class PlanKeeper {
   int looks_ = 0;                ///< at the present blockage, in vain
   Point2 last_at_;
   std::vector<Point2> closed_;   ///< looked at on the way to this goal, and closed
+  bool looked_at_all_ = false;   ///< and so at every way once
   Point2 at_;
   Point2 through_{1.0, 0.0};  ///< the direction of the way that is closed at at_
   bool switched_ = false;

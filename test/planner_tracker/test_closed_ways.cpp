@@ -76,9 +76,12 @@ class TwoDoors : public ::testing::Test {
   PlanKeeper keeper_;
 };
 
+/// The robot sees the door from 0.9 m farther on, and need not hurry there.
+constexpr double kToSee_s = 4.0;
+
 TEST_F(TwoDoors, ADoorFoundShutIsGoneRoundAfterAMoment) {
   for (double t = 1.0; t < config_.planning.hold_s; t += 0.5) EXPECT_EQ(look(0.0, t), PlanKeeper::Outcome::kToBlockage) << t;
-  look(0.0, config_.planning.hold_s + 1.5);
+  look(0.0, config_.planning.hold_s + kToSee_s);
   EXPECT_TRUE(goes_round());
 }
 
@@ -88,19 +91,19 @@ TEST_F(TwoDoors, ForSomebodyWhoWalksThereTheRobotWaitsAsLongAsTheWayRoundIsLong)
   ASSERT_GT(worth_s, config_.planning.hold_s + 2.0);
   EXPECT_EQ(look(0.0, 1.0, {{5.9, 3.2}}), PlanKeeper::Outcome::kToBlockage);
   EXPECT_EQ(look(0.0, config_.planning.hold_s + 1.5), PlanKeeper::Outcome::kToBlockage);
-  look(0.0, worth_s + 2.0);
+  look(0.0, worth_s + kToSee_s);
   EXPECT_TRUE(goes_round());
 }
 
 TEST_F(TwoDoors, WhoWalksElsewhereIsNotWaitedFor) {
   look(0.0, 1.0, {{2.0, 15.0}});
-  look(0.0, config_.planning.hold_s + 1.5);
+  look(0.0, config_.planning.hold_s + kToSee_s);
   EXPECT_TRUE(goes_round());
 }
 
 TEST_F(TwoDoors, AWayFoundShutMustBeWiderThanTheRobotToTurnBackFor) {
   look(0.0, 1.0);
-  look(0.0, config_.planning.hold_s + 1.5);
+  look(0.0, config_.planning.hold_s + kToSee_s);
   ASSERT_TRUE(goes_round());
   for (double t = 10.0; t < 20.0; t += 1.0) {
     look(0.5, t);  // hardly wider than the robot needs
@@ -119,7 +122,7 @@ TEST_F(TwoDoors, AWayFoundShutTwiceIsNotTurnedBackForThoughItLooksOpen) {
   for (int time = 0; time < 2; ++time) {
     EXPECT_FALSE(goes_round()) << time;
     look(0.0, t += 1.0);
-    look(0.0, t += config_.planning.hold_s + 0.5);
+    look(0.0, t += config_.planning.hold_s + kToSee_s);
     ASSERT_TRUE(goes_round()) << time;
     look(0.9, t += 10.0);
   }
@@ -129,6 +132,46 @@ TEST_F(TwoDoors, AWayFoundShutTwiceIsNotTurnedBackForThoughItLooksOpen) {
   EXPECT_TRUE(goes_round());
   look(0.9, found_s + config_.planning.closed_memory_s + 1.0);
   EXPECT_FALSE(goes_round());
+}
+
+TEST(ClosedWay, AWayThatIsFarRoundIsNotTakenBeforeTheRobotHasBeenWhereItSees) {
+  // 10 m before the door, which then seems shut; 32 m round.
+  const PlannerTrackerConfig config;
+  OccupancyGrid open = room(18.0, 20.0);
+  fill(&open, 11.95, 0.0, 12.05, 20.0, 100);
+  fill(&open, 11.95, 17.0, 12.05, 18.0, 0);
+  OccupancyGrid shut = open;
+  fill(&open, 11.95, 2.5, 12.05, 3.5, 0);
+  CombinedMap map(config.preferred_radius_m() + 0.2, config.clearance.occupied_threshold, config.clearance.free_threshold);
+  map.set_global({}, open, {});
+  PlanKeeper keeper(config);
+  keeper.set_map(map);
+  ASSERT_EQ(keeper.replan(map, {2.0, 3.0, 0.0}, {16.0, 3.0}, 100.0), PlanKeeper::Outcome::kToGoal);
+  map.set_local(shut, Pose2{});
+  for (double t = 1.0; t < 10.0; t += 1.0) {  // at 0.6 m/s
+    EXPECT_EQ(keeper.replan(map, {2.0 + 0.6 * t, 3.0, 0.0}, {16.0, 3.0}, 100.0 + t), PlanKeeper::Outcome::kToBlockage) << t;
+  }
+  // Near by it turns out to be a wide enough gap.
+  map.set_local(open, Pose2{});
+  EXPECT_EQ(keeper.replan(map, {9.0, 3.0, 0.0}, {16.0, 3.0}, 113.0), PlanKeeper::Outcome::kToGoal);
+  EXPECT_LT(keeper.path().remaining_m(), 10.0);
+}
+
+TEST(ClosedWay, WhereAllWaysAreClosedTheyAreLookedAtInTurn) {
+  // Two doors. The nearer is shut, and somebody stands in the farther, who leaves when the robot has gone back to the nearer.
+  OccupancyGrid map = room(12.0, 6.0);
+  fill(&map, 5.95, 0.0, 6.05, 6.0, 100);
+  fill(&map, 5.95, 0.6, 6.05, 1.5, 0);
+  fill(&map, 5.95, 4.5, 6.05, 5.4, 0);
+  OccupancyGrid truth = map;
+  fill(&truth, 5.95, 0.6, 6.05, 1.5, 100);
+  ToyWorld world(truth, map, {2.5, 2.4, 0.0}, {});
+  const double began_s = world.now_s;
+  world.discs.push_back({[=](double t) { return t - began_s < 30.0 ? Point2{6.0, 4.95} : Point2{-5.0, 0.0}; }});
+  world.sees_free_from_m = 1.3;
+  world.planner.set_goal({10.0, 1.0, 0.0});
+  EXPECT_EQ(world.run(120.0).activity, Activity::kReached) << world.planner.failure().reason;
+  EXPECT_EQ(world.collisions, 0);
 }
 
 TEST(ClosedWay, ALaneThatAWallsCellsNarrowStaysOpenForTheRobotOnItsWayThere) {
