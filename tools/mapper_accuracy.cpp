@@ -59,6 +59,17 @@ void ScanAccuracy::add(const RangeScan& scan, double evidence_decay_s, const Ran
   }
 }
 
+ScanShare ScanShare::of(const RangeScan& scan, const RangeScan& perfect) {
+  std::size_t near = 0, seen = 0;
+  for (std::size_t i = 0; i < scan.range_m.size(); ++i) {
+    const float truth = perfect.range_m[i * perfect.range_m.size() / scan.range_m.size()];
+    if (!(truth <= kNear_m)) continue;
+    ++near;
+    seen += std::fabs(scan.range_m[i] - truth) <= kFalse_m ? 1 : 0;
+  }
+  return {scan.stamp_s, near == 0 ? 0.0 : static_cast<double>(seen) / static_cast<double>(near)};
+}
+
 void ScanAccuracy::add(const ScanAccuracy& other) {
   rays += other.rays;
   false_obstacles += other.false_obstacles;
@@ -107,6 +118,7 @@ MapperAccuracy measure_mapper(const ProfileRecording& recording, const LocalMapp
     if (!result.accepted) continue;
     mapper.extract_scan_360(&scan);
     accuracy.scan.add(scan, config.contour.evidence_decay_s, perfect);
+    accuracy.shares.push_back(ScanShare::of(scan, perfect));
   }
   accuracy.elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const Trajectory truth = thinned(recording.truth);

@@ -21,6 +21,12 @@ struct ScanAccuracy {
   double quantile_m(double share) const;  ///< NaN if there are none
 };
 
+/// Of what a perfect scanner sees within 8 m, how much the virtual scan shows, however long ago it was seen.
+struct ScanShare {
+  double stamp_s = 0.0, seen = 0.0;
+  static ScanShare of(const RangeScan& virtual_scan, const RangeScan& perfect);
+};
+
 /// One drive.
 struct MapperAccuracy {
   static constexpr double kLengths_m[3] = {20.0, 50.0, 100.0};
@@ -31,6 +37,7 @@ struct MapperAccuracy {
   double path_m = 0.0, duration_s = 0.0, elapsed_s = 0.0;
   std::vector<double> lifespan_s;  ///< of the generations of particles
   ScanAccuracy scan;
+  std::vector<ScanShare> shares;
   Trajectory estimate, odometry;
   RangeOffsets learned;  ///< of the sensor, at the end
 };

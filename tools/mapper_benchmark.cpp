@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "ros_common/command_line.h"
 #include "tools/mapper_accuracy.h"
+#include "tools/parked_accuracy.h"
 #include "tools/simulated_recordings.h"
 
 namespace knav {
@@ -25,12 +26,15 @@ constexpr char kHelp[] =
     "  default     a Kinect as bought, uncalibrated: up to 10 % wrong at 10 m\n"
     "  harsh       a bad one, uncalibrated: up to 16 %\n"
     "  paper       as calibrated, the local mapper as in --paper-config\n"
-    "  people      as calibrated, with twenty people walking about";
+    "  people      as calibrated, with twenty people walking about\n"
+    "  parked      the same people; the robot stands among them for half an hour, and drives on (15 min to simulate)";
 constexpr char kJsonHelp[] =
     R"(The JSON holds, per row: seeds, worlds and sensor; runs[]: seed, segments."20", "50", "100" (metres of path):
 {count, translation_mean_m, translation_mean_percent, translation_max_m, rotation_mean_deg}, odometry_segments (the
 same of odometry alone), lost, epochs, path_m, duration_s, elapsed_s, lifespan_mean_s, scan: {rays,
-error_median_m, error_p95_m, false_obstacle_percent, miss_percent}; mean: the runs' mean of the same, and
+error_median_m, error_p95_m, false_obstacle_percent, miss_percent}, parked (row parked): {parked_s, moved_m, turned_deg, later_m, seen_before,
+seen_after}: how far the estimate of the standing robot went, its error 10 m later, and the share of what a perfect scanner sees
+within 8 m that scan_360 shows, in the stop's first and last minute; mean: the runs' mean of the same, and
 worst_to_mean_20_m. lost: some 20 m segment is more than 2 m off. scan: rays with evidence under 10 s; errors within
 8 m; a false obstacle is a return 0.3 m and 5 % nearer than anything within 0.1 m beside its ray.)";
 
@@ -42,7 +46,7 @@ struct Options {
 };
 
 struct Row {
-  std::string name, world = "brin_building.yaml", sensor = "calibrated";
+  std::string name, world = "brin_building.yaml", tour = "brin_tour.yaml", sensor = "calibrated";
   bool paper = false, driven = false;
 };
 
@@ -51,7 +55,8 @@ Row row_named(const std::string& name) {
   if (name == "ideal" || name == "default" || name == "harsh") row.sensor = name;
   row.paper = name == "paper";
   row.driven = name == "driven";
-  if (name == "people") row.world = "brin_people.yaml";
+  if (name == "people" || name == "parked") row.world = "brin_people.yaml";
+  if (name == "parked") row.tour = "brin_parked_tour.yaml";
   return row;
 }
 
@@ -119,6 +124,19 @@ void print_line(const std::string& name, const std::string& seed, const nlohmann
   std::fflush(stdout);
 }
 
+nlohmann::json parked_json(const ParkedAccuracy& p) {
+  return {{"parked_s", p.parked_s},       {"moved_m", p.moved_m},         {"turned_deg", p.turned_deg},
+          {"later_m", p.later_m},         {"seen_before", p.seen_before}, {"seen_after", p.seen_after}};
+}
+
+void print_parked(int seed, const nlohmann::json& p) {
+  fmt::print("parked      {:>5}  {:.0f} s; the estimate moved by {:.4f} m and {:.3f} deg at most; error 10 m later {:.3f} m; of what is within 8 m "
+             "scan_360 shows {:.1f} % in the first minute, {:.1f} % in the last\n",
+             seed, p["parked_s"].get<double>(), p["moved_m"].get<double>(), p["turned_deg"].get<double>(), p["later_m"].get<double>(),
+             100.0 * p["seen_before"].get<double>(), 100.0 * p["seen_after"].get<double>());
+  std::fflush(stdout);
+}
+
 /// The mean over runs of every number that print_line shows.
 nlohmann::json mean_json(const nlohmann::json& runs, const ScanAccuracy& scan, double* worst_to_mean) {
   nlohmann::json mean;
@@ -150,7 +168,7 @@ void benchmark(const Options& options) {
   const auto drive_of = [&](const Row& row, int seed) {
     SimulatedDrive drive;
     drive.world_file = options.worlds + "/" + row.world;
-    drive.tour_file = options.worlds + "/brin_tour.yaml";
+    drive.tour_file = options.worlds + "/" + row.tour;
     drive.sensor = row.sensor;
     drive.seed = seed;
     drive.front_end = FrontEndConfig::from_file(options.config);
@@ -204,10 +222,17 @@ void benchmark(const Options& options) {
         write_trajectory(path + ".truth.tum", recording.truth);
       }
       nlohmann::json run = run_json(seed, accuracy);
+      if (name == "parked") {
+        run["parked"] = parked_json(parked_accuracy(accuracy.estimate, recording.truth, accuracy.shares));
+        print_parked(seed, run["parked"]);
+        runs.push_back(std::move(run));
+        continue;
+      }
       print_line(name, std::to_string(seed), run, NAN);
       runs.push_back(std::move(run));
     }
-    if (runs.empty()) continue;
+    if (name == "parked" && !runs.empty()) json[name] = {{"world", row.world}, {"sensor", row.sensor}, {"seeds", seeds}, {"runs", runs}};
+    if (runs.empty() || name == "parked") continue;
     double worst_to_mean = 0.0;
     const nlohmann::json mean = mean_json(runs, scan, &worst_to_mean);
     print_line(name, "mean", mean, worst_to_mean);
@@ -226,7 +251,7 @@ int main(int argc, char** argv) {
   options.cache = knav::default_cache();
   app.add_option("--rows", options.rows, "Which rows, separated by commas")
       ->delimiter(',')
-      ->check(CLI::IsMember({"ideal", "calibrated", "driven", "default", "harsh", "paper", "people"}))
+      ->check(CLI::IsMember({"ideal", "calibrated", "driven", "default", "harsh", "paper", "people", "parked"}))
       ->capture_default_str();
   app.add_option("--seeds", options.seeds, "Drives a row")->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--first-seed", options.first_seed, "Seed of the first drive")
@@ -237,7 +262,7 @@ int main(int argc, char** argv) {
   app.add_option("--paper-config", options.paper_config, "The same of the row 'paper'; only 'local_mapper' is used")
       ->capture_default_str();
   app.add_option("--worlds", options.worlds,
-                 "Folder of brin_building.yaml, brin_people.yaml and brin_tour.yaml")
+                 "Folder of brin_building.yaml, brin_people.yaml, brin_tour.yaml and brin_parked_tour.yaml")
       ->capture_default_str();
   app.add_option("--cache", options.cache, "Folder of the simulated drives")->capture_default_str();
   app.add_option("--json", options.json, "Write all figures here ('-' for standard output)");
