@@ -41,14 +41,15 @@ void PlanKeeper::take(const std::vector<Point2>& path) {
   ++switches_;
 }
 
-double PlanKeeper::old_cost_m(const MapLayer& layer, Path* path, const Point2& robot) {
+double PlanKeeper::old_cost_m(const MapLayer& layer, bool to_goal, Path* path, const Point2& robot) {
   if (path->empty()) return kInfinite;
   path->advance(robot);
   if (path->offset_m() > kOffPath_m) return kInfinite;
   path->rest(&rest_);
   double cost = path->offset_m();
   for (std::size_t i = 1; i < rest_.size(); ++i) {
-    cost += strict_ ? planner_.segment_cost_m(layer, rest_[i - 1], rest_[i]) : planner_.kept_cost_m(layer, rest_[i - 1], rest_[i]);
+    cost += strict_ || !to_goal ? planner_.segment_cost_m(layer, rest_[i - 1], rest_[i])
+                                : planner_.kept_cost_m(layer, rest_[i - 1], rest_[i]);
     // The cells the robot stands in may be closed: it is on its way out of them.
     if (!std::isfinite(cost) && i == 1 && !planner_.open(layer, rest_[0])) cost = path->remaining_m();
   }
@@ -219,14 +220,14 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
       planner_.plan(layer, robot, nearby, &result_);
     }
   }
-  if (kind == Outcome::kToGoal && holding() && std::isfinite(old_cost_m(layer, &held_, robot))) {
+  if (kind == Outcome::kToGoal && holding() && std::isfinite(old_cost_m(layer, true, &held_, robot))) {
     // Open again: on as before.
     path_ = held_;
     path_kind_ = kind;
     held_since_s_ = -1.0;
   }
   const bool no_new_way = result_.code == PlanCode::kNoPath || result_.code == PlanCode::kStartBlocked;
-  if (no_new_way && kind == Outcome::kToGoal && path_kind_ == kind && std::isfinite(old_cost_m(layer, &path_, robot))) {
+  if (no_new_way && kind == Outcome::kToGoal && path_kind_ == kind && std::isfinite(old_cost_m(layer, true, &path_, robot))) {
     elsewhere_ = look_elsewhere_ = false;
     return kind;
   }
@@ -238,14 +239,14 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
       take(way);
     }
     look_elsewhere_ = false;
-    if (elsewhere_ && std::isfinite(old_cost_m(layer, &path_, robot))) {
+    if (elsewhere_ && std::isfinite(old_cost_m(layer, false, &path_, robot))) {
       path_kind_ = kind;
       return kind;
     }
     planner_.plan(layer, robot, nearby, &result_);
   }
   if (result_.code == PlanCode::kOk) {
-    const double old = path_kind_ == kind ? old_cost_m(layer, &path_, robot) : kInfinite;
+    const double old = path_kind_ == kind ? old_cost_m(layer, kind == Outcome::kToGoal, &path_, robot) : kInfinite;
     const bool was_to_goal = kind == Outcome::kToGoal && (holding() || (path_kind_ == kind && !path_.empty()));
     if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s, moving)) return Outcome::kToBlockage;
     held_since_s_ = -1.0;
@@ -295,7 +296,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
   };
   const bool robot_too_near = too_near(robot);
   // What closes the way may be elsewhere than it seemed from afar: then it is looked at from elsewhere, too.
-  const bool keep = path_kind_ == Outcome::kToBlockage && !look_elsewhere_ && std::isfinite(old_cost_m(layer, &path_, robot)) &&
+  const bool keep = path_kind_ == Outcome::kToBlockage && !look_elsewhere_ && std::isfinite(old_cost_m(layer, false, &path_, robot)) &&
                     (elsewhere_ || looks_at_it(unchanged, path_.end())) && !(robot_too_near && too_near(path_.end()));
   if (!keep) {
     elsewhere_ = false;
