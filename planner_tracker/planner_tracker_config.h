@@ -11,7 +11,7 @@ namespace knav {
 struct ClearanceConfig {
   double hard_m = 0.05;
   double insist = 0.6;
-  double keep = 0.1;
+  double keep = 0.4;
   double preferred_m = 0.25;
   double price = 2.0;
   double escape_m = 1.0;

@@ -13,11 +13,13 @@ class ShutWays {
  public:
   void clear() { shut_.clear(); }
   /// Found closed, and remembered until then. Again after some seconds counts as another time.
-  void add(const Point2& at, double now_s, double until_s);
+  /// @param from_near  seen from where there is no doubt
+  void add(const Point2& at, bool from_near, double now_s, double until_s);
   /// True if a place within `round_m` of this one was found closed.
   bool has(const Point2& at, double round_m, double now_s) const;
-  /// True if the path leads past a place that was found closed, and is no wider there than `clear_m` on either side, or however
-  /// wide it looks if it was found closed more than once.
+  /// Where the robot does not try again, however open it looks, as long as there is another way: found closed from near, or often.
+  const std::vector<Point2>& barred(double now_s);
+  /// True if the path leads past a place that was found closed, and is no wider there than `clear_m` on either side.
   bool barely_open(const MapLayer& layer, const std::vector<Point2>& path, double clear_m, double now_s);
 
  private:
@@ -25,8 +27,12 @@ class ShutWays {
     Point2 at;
     double until_s, last_s;
     int times;
+    bool from_near;
   };
+  void forget(double now_s);
+
   std::vector<Shut> shut_;
+  std::vector<Point2> barred_;
 };
 
 }  // namespace knav
