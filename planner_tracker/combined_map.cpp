@@ -195,29 +195,6 @@ const MapLayer& CombinedMap::permissive(const std::vector<Point2>& closed, doubl
   return permissive_;
 }
 
-const MapLayer& CombinedMap::barred(const std::vector<Point2>& points, double round_m) {
-  barred_ = combined_;
-  const GridGeometry& g = global_.geometry;
-  const int r = static_cast<int>(round_m / g.resolution_m);
-  for (const Point2& p : points) {
-    CellWindow closed;
-    const int cx = g.cell_x(p.x_m), cy = g.cell_y(p.y_m);
-    for (int dy = -r; dy <= r; ++dy) {
-      for (int dx = -r; dx <= r; ++dx) {
-        if (dx * dx + dy * dy > r * r || !g.contains(cx + dx, cy + dy)) continue;
-        CellState& state = barred_.state[g.index(cx + dx, cy + dy)];
-        if (state != CellState::kFree) continue;
-        state = CellState::kOccupied;
-        closed.include(cx + dx, cy + dy);
-      }
-    }
-    if (closed.empty()) continue;
-    distance_.update(g.width_cells, g.height_cells, bytes(barred_.state), kOpen, closed.grown(distance_.reach_cells() + 1),
-                     barred_.squared_cells.data());
-  }
-  return barred_;
-}
-
 bool CombinedMap::on_local(int ix, int iy) const {
   if (local_geometry_.width_cells == 0) return true;
   const Point2 p = T_local_map_ * Point2{global_.geometry.center_x_m(ix), global_.geometry.center_y_m(iy)};

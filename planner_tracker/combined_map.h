@@ -73,8 +73,6 @@ class CombinedMap {
   /// local map saw free. Made anew by each call, over the whole map: for when there is no way.
   /// @param closed  what closes the map within `round_m` of these points stays
   const MapLayer& permissive(const std::vector<Point2>& closed = {}, double round_m = 0.0);
-  /// The combined map with what lies within `round_m` of these points closed. Made anew by each call.
-  const MapLayer& barred(const std::vector<Point2>& points, double round_m);
   /// The cells that the newest local map covers, as far as it knows anything.
   const CellWindow& local_window() const { return local_window_; }
   /// Cells whose state changed in the last call.
@@ -91,7 +89,7 @@ class CombinedMap {
 
   double reach_m_;
   int occupied_threshold_, free_threshold_;
-  MapLayer global_, combined_, permissive_, barred_;
+  MapLayer global_, combined_, permissive_;
   TruncatedDistance distance_;
   CellWindow local_window_;             ///< of the last local map
   std::vector<CellState> local_cells_;  ///< of `local_window_`, row-major

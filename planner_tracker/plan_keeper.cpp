@@ -23,7 +23,6 @@ constexpr double kThrough_m = 0.5;  ///< beyond where it is closed, for a way's 
 constexpr int kDirections = 24;
 constexpr int kMostTried = 4;
 constexpr double kNear_m = 0.3;     ///< farther than look_distance_m is near enough to be sure
-constexpr double kBarred_m = 0.35;  ///< round a place found closed
 constexpr double kUnhurried = 1.5;  ///< times as long as at full speed
 constexpr double kMovesThere_m = 1.0;  ///< of where the way is closed
 constexpr double kWider_m = 0.05;      ///< a way once found closed must be wider by this on either side to turn back for
@@ -78,7 +77,8 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   const double until_s = now_s + config_.planning.closed_memory_s;
   const bool from_near = std::hypot(robot.x_m - at_.x_m, robot.y_m - at_.y_m) < config_.planning.look_distance_m + kNear_m;
   if (!seen_shut_.has(at_, kSamePlace_m, now_s)) seen_shut_.add(at_, from_near, now_s, until_s);
-  const double detour_m = result_.cost_m - held_.remaining_m();
+  // A way that was found closed is no way round.
+  const double detour_m = shut_.leads_past(result_.path, now_s) ? kInfinite : result_.cost_m - held_.remaining_m();
   if (detour_m < config_.planning.hold_detour_m) {
     shut_.add(at_, from_near, now_s, until_s);
     return false;
@@ -93,7 +93,8 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   }
   const auto there = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kMovesThere_m; };
   held_for_somebody_ = held_for_somebody_ || std::any_of(moving.begin(), moving.end(), there);
-  const double worth_s = held_for_somebody_ ? config_.planning.hold_share * detour_m / config_.max_vel_x : 0.0;
+  const double worth_s =
+      held_for_somebody_ && std::isfinite(detour_m) ? config_.planning.hold_share * detour_m / config_.max_vel_x : 0.0;
   if (now_s - held_since_s_ > to_see_s_ + std::max(config_.planning.hold_s, worth_s)) {
     shut_.add(at_, from_near, now_s, until_s);
     return false;
@@ -208,23 +209,10 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
   switched_ = false;
   strict_ = now_s < strict_until_s_;
   const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
-  const std::vector<Point2>& barred = shut_.barred(now_s);
-  const MapLayer* planned_on = barred.empty() ? &map.combined() : &map.barred(barred, kBarred_m);
-  planner_.plan(*planned_on, robot, goal, &result_);
-  if (!barred.empty() && result_.code != PlanCode::kOk) {
-    // The other ways are closed too. What closes the one it was on is looked at first; then every way counts again.
-    const bool was_to_goal = holding() || (path_kind_ == Outcome::kToGoal && !path_.empty());
-    result_.cost_m = kInfinite;
-    if (was_to_goal && !std::isfinite(old_cost_m(map.combined(), true, holding() ? &held_ : &path_, robot)) &&
-        hold(map, robot, now_s, moving)) {
-      return Outcome::kToBlockage;
-    }
-    planned_on = &map.combined();
-    planner_.plan(*planned_on, robot, goal, &result_);
-  }
-  const MapLayer& layer = *planned_on;
+  const MapLayer& layer = map.combined();
   Outcome kind = Outcome::kToGoal;
   Point2 nearby;
+  planner_.plan(layer, robot, goal, &result_);
   if (result_.code == PlanCode::kGoalOccupied || result_.code == PlanCode::kGoalUnknown) {
     at_ = result_.at;
     if (!planner_.open(map.global(), goal)) {
@@ -276,7 +264,8 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     const bool clearly_better = new_cost < now_cost * (1.0 - config_.planning.switch_gain) &&
                                 new_cost < now_cost - config_.planning.switch_gain_m;
     const auto barely_open = [&] {
-      return kind == Outcome::kToGoal && shut_.barely_open(layer, result_.path, config_.hard_radius_m() + kWider_m, now_s);
+      return kind == Outcome::kToGoal && (shut_.leads_past(result_.path, now_s) ||
+                                          shut_.barely_open(layer, result_.path, config_.hard_radius_m() + kWider_m, now_s));
     };
     if (!same_end || !std::isfinite(old) || (clearly_better && !barely_open())) take(result_.path);
     path_kind_ = kind;

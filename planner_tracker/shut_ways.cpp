@@ -27,13 +27,18 @@ void ShutWays::forget(double now_s) {
   shut_.erase(std::remove_if(shut_.begin(), shut_.end(), [&](const Shut& s) { return now_s > s.until_s; }), shut_.end());
 }
 
-const std::vector<Point2>& ShutWays::barred(double now_s) {
+bool ShutWays::leads_past(const std::vector<Point2>& path, double now_s) {
   forget(now_s);
-  barred_.clear();
   for (const Shut& s : shut_) {
-    if (s.from_near || s.times >= kOften) barred_.push_back(s.at);
+    if (!s.from_near && s.times < kOften) continue;
+    for (std::size_t i = 1; i < path.size(); ++i) {
+      const Point2 a = path[i - 1], b = path[i];
+      const double x = b.x_m - a.x_m, y = b.y_m - a.y_m, square = x * x + y * y;
+      const double along = square > 0.0 ? std::clamp(((s.at.x_m - a.x_m) * x + (s.at.y_m - a.y_m) * y) / square, 0.0, 1.0) : 0.0;
+      if (std::hypot(a.x_m + along * x - s.at.x_m, a.y_m + along * y - s.at.y_m) < kSame_m) return true;
+    }
   }
-  return barred_;
+  return false;
 }
 
 bool ShutWays::has(const Point2& at, double round_m, double now_s) const {

@@ -17,8 +17,9 @@ class ShutWays {
   void add(const Point2& at, bool from_near, double now_s, double until_s);
   /// True if a place within `round_m` of this one was found closed.
   bool has(const Point2& at, double round_m, double now_s) const;
-  /// Where the robot does not try again, however open it looks, as long as there is another way: found closed from near, or often.
-  const std::vector<Point2>& barred(double now_s);
+  /// True if the path leads past a place that was found closed from near, or often: however open it looks, it is not tried again
+  /// as long as there is another way.
+  bool leads_past(const std::vector<Point2>& path, double now_s);
   /// True if the path leads past a place that was found closed, and is no wider there than `clear_m` on either side.
   bool barely_open(const MapLayer& layer, const std::vector<Point2>& path, double clear_m, double now_s);
 
@@ -32,7 +33,6 @@ class ShutWays {
   void forget(double now_s);
 
   std::vector<Shut> shut_;
-  std::vector<Point2> barred_;
 };
 
 }  // namespace knav
