@@ -185,7 +185,7 @@ const MapLayer& PlanKeeper::plan_unchanged(CombinedMap& map, const Point2& robot
   planner_.plan(*unchanged, robot, goal, &result_);
   if (result_.code != PlanCode::kOk && closed_.size() > 1) {
     // All ways were looked at. What closed the others may have gone since.
-    looked_at_all_ = true;
+    ++rounds_;
     closed_.erase(closed_.begin(), closed_.end() - 1);
     unchanged = &map.permissive(closed_, kClosedRound_m);
     planner_.plan(*unchanged, robot, goal, &result_);
@@ -314,7 +314,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
       way_to_look(layer, unchanged, robot, 0.0, &way);
     }
     look_elsewhere_ = false;
-    elsewhere_ = elsewhere_ || looked_at_all_ || std::any_of(closed_.begin(), closed_.end(), same_place);
+    elsewhere_ = elsewhere_ || rounds_ > 1 || std::any_of(closed_.begin(), closed_.end(), same_place);
     take(way);
   }
   path_kind_ = Outcome::kToBlockage;

@@ -36,7 +36,7 @@ class PlanKeeper {
     held_since_s_ = -1.0;
     elsewhere_ = look_elsewhere_ = false;
     looks_ = 0;
-    looked_at_all_ = false;
+    rounds_ = 0;
     closed_.clear();
     shut_.clear();
     seen_shut_.clear();
@@ -105,7 +105,7 @@ class PlanKeeper {
   int looks_ = 0;                ///< at the present blockage, in vain
   Point2 last_at_;
   std::vector<Point2> closed_;   ///< looked at on the way to this goal, and closed
-  bool looked_at_all_ = false;   ///< and so at every way once
+  int rounds_ = 0;               ///< of looking at every way; from the second on they are no progress
   Point2 at_;
   Point2 through_{1.0, 0.0};  ///< the direction of the way that is closed at at_
   bool switched_ = false;
