@@ -22,7 +22,6 @@ constexpr double kAside_m = 4.0;    ///< of detour, to look at a way straight an
 constexpr double kThrough_m = 0.5;  ///< beyond where it is closed, for a way's direction there
 constexpr int kDirections = 24;
 constexpr int kMostTried = 4;
-constexpr double kNear_m = 0.3;     ///< farther than look_distance_m is near enough to be sure
 constexpr double kUnhurried = 1.5;  ///< times as long as at full speed
 constexpr double kMovesThere_m = 1.0;  ///< of where the way is closed
 constexpr double kWider_m = 0.05;      ///< a way once found closed must be wider by this on either side to turn back for
@@ -42,15 +41,14 @@ void PlanKeeper::take(const std::vector<Point2>& path) {
   ++switches_;
 }
 
-double PlanKeeper::old_cost_m(const MapLayer& layer, bool to_goal, Path* path, const Point2& robot) {
+double PlanKeeper::old_cost_m(const MapLayer& layer, Path* path, const Point2& robot) {
   if (path->empty()) return kInfinite;
   path->advance(robot);
   if (path->offset_m() > kOffPath_m) return kInfinite;
   path->rest(&rest_);
   double cost = path->offset_m();
   for (std::size_t i = 1; i < rest_.size(); ++i) {
-    cost += strict_ || !to_goal ? planner_.segment_cost_m(layer, rest_[i - 1], rest_[i])
-                                : planner_.kept_cost_m(layer, rest_[i - 1], rest_[i]);
+    cost += strict_ ? planner_.segment_cost_m(layer, rest_[i - 1], rest_[i]) : planner_.kept_cost_m(layer, rest_[i - 1], rest_[i]);
     // The cells the robot stands in may be closed: it is on its way out of them.
     if (!std::isfinite(cost) && i == 1 && !planner_.open(layer, rest_[0])) cost = path->remaining_m();
   }
@@ -75,12 +73,10 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   held_.rest(&way);
   if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), !strict_, &way)) return false;
   const double until_s = now_s + config_.planning.closed_memory_s;
-  const bool from_near = std::hypot(robot.x_m - at_.x_m, robot.y_m - at_.y_m) < config_.planning.look_distance_m + kNear_m;
-  if (!seen_shut_.has(at_, kSamePlace_m, now_s)) seen_shut_.add(at_, from_near, now_s, until_s);
-  // A way that was found closed is no way round.
-  const double detour_m = shut_.leads_past(result_.path, now_s) ? kInfinite : result_.cost_m - held_.remaining_m();
+  if (!seen_shut_.has(at_, kSamePlace_m, now_s)) seen_shut_.add(at_, now_s, until_s);
+  const double detour_m = result_.cost_m - held_.remaining_m();
   if (detour_m < config_.planning.hold_detour_m) {
-    shut_.add(at_, from_near, now_s, until_s);
+    shut_.add(at_, now_s, until_s);
     return false;
   }
   if (first) {
@@ -93,10 +89,9 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   }
   const auto there = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kMovesThere_m; };
   held_for_somebody_ = held_for_somebody_ || std::any_of(moving.begin(), moving.end(), there);
-  const double worth_s =
-      held_for_somebody_ && std::isfinite(detour_m) ? config_.planning.hold_share * detour_m / config_.max_vel_x : 0.0;
+  const double worth_s = held_for_somebody_ ? config_.planning.hold_share * detour_m / config_.max_vel_x : 0.0;
   if (now_s - held_since_s_ > to_see_s_ + std::max(config_.planning.hold_s, worth_s)) {
-    shut_.add(at_, from_near, now_s, until_s);
+    shut_.add(at_, now_s, until_s);
     return false;
   }
   path_.set(way);
@@ -224,14 +219,14 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
       planner_.plan(layer, robot, nearby, &result_);
     }
   }
-  if (kind == Outcome::kToGoal && holding() && std::isfinite(old_cost_m(layer, true, &held_, robot))) {
+  if (kind == Outcome::kToGoal && holding() && std::isfinite(old_cost_m(layer, &held_, robot))) {
     // Open again: on as before.
     path_ = held_;
     path_kind_ = kind;
     held_since_s_ = -1.0;
   }
   const bool no_new_way = result_.code == PlanCode::kNoPath || result_.code == PlanCode::kStartBlocked;
-  if (no_new_way && kind == Outcome::kToGoal && path_kind_ == kind && std::isfinite(old_cost_m(layer, true, &path_, robot))) {
+  if (no_new_way && kind == Outcome::kToGoal && path_kind_ == kind && std::isfinite(old_cost_m(layer, &path_, robot))) {
     elsewhere_ = look_elsewhere_ = false;
     return kind;
   }
@@ -243,14 +238,14 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
       take(way);
     }
     look_elsewhere_ = false;
-    if (elsewhere_ && std::isfinite(old_cost_m(layer, false, &path_, robot))) {
+    if (elsewhere_ && std::isfinite(old_cost_m(layer, &path_, robot))) {
       path_kind_ = kind;
       return kind;
     }
     planner_.plan(layer, robot, nearby, &result_);
   }
   if (result_.code == PlanCode::kOk) {
-    const double old = path_kind_ == kind ? old_cost_m(layer, kind == Outcome::kToGoal, &path_, robot) : kInfinite;
+    const double old = path_kind_ == kind ? old_cost_m(layer, &path_, robot) : kInfinite;
     const bool was_to_goal = kind == Outcome::kToGoal && (holding() || (path_kind_ == kind && !path_.empty()));
     if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s, moving)) return Outcome::kToBlockage;
     held_since_s_ = -1.0;
@@ -264,8 +259,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     const bool clearly_better = new_cost < now_cost * (1.0 - config_.planning.switch_gain) &&
                                 new_cost < now_cost - config_.planning.switch_gain_m;
     const auto barely_open = [&] {
-      return kind == Outcome::kToGoal && (shut_.leads_past(result_.path, now_s) ||
-                                          shut_.barely_open(layer, result_.path, config_.hard_radius_m() + kWider_m, now_s));
+      return kind == Outcome::kToGoal && shut_.barely_open(layer, result_.path, config_.hard_radius_m() + kWider_m, now_s);
     };
     if (!same_end || !std::isfinite(old) || (clearly_better && !barely_open())) take(result_.path);
     path_kind_ = kind;
@@ -301,7 +295,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
   };
   const bool robot_too_near = too_near(robot);
   // What closes the way may be elsewhere than it seemed from afar: then it is looked at from elsewhere, too.
-  const bool keep = path_kind_ == Outcome::kToBlockage && !look_elsewhere_ && std::isfinite(old_cost_m(layer, false, &path_, robot)) &&
+  const bool keep = path_kind_ == Outcome::kToBlockage && !look_elsewhere_ && std::isfinite(old_cost_m(layer, &path_, robot)) &&
                     (elsewhere_ || looks_at_it(unchanged, path_.end())) && !(robot_too_near && too_near(path_.end()));
   if (!keep) {
     elsewhere_ = false;

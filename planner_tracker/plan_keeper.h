@@ -63,8 +63,7 @@ class PlanKeeper {
   GridPlanner& planner() { return planner_; }
 
  private:
-  /// @param to_goal  the path leads to the goal, and counts as open where it is a little narrower than a new one must be
-  double old_cost_m(const MapLayer& layer, bool to_goal, Path* path, const Point2& robot);
+  double old_cost_m(const MapLayer& layer, Path* path, const Point2& robot);
   /// What it costs to turn towards a path's beginning: the metres the robot could have driven meanwhile.
   double turning_cost_m(const Path& path, const Pose2& robot) const;
   /// True if the way round is to be left alone for now.

@@ -11,34 +11,15 @@ constexpr double kAnotherTime_s = 5.0;
 constexpr int kOften = 2;
 }  // namespace
 
-void ShutWays::add(const Point2& at, bool from_near, double now_s, double until_s) {
+void ShutWays::add(const Point2& at, double now_s, double until_s) {
   for (Shut& s : shut_) {
     if (now_s > s.until_s || std::hypot(s.at.x_m - at.x_m, s.at.y_m - at.y_m) > kSame_m) continue;
     if (now_s - s.last_s > kAnotherTime_s) ++s.times;
-    s.from_near = s.from_near || from_near;
     s.last_s = now_s;
     s.until_s = until_s;
     return;
   }
-  shut_.push_back({at, until_s, now_s, 1, from_near});
-}
-
-void ShutWays::forget(double now_s) {
-  shut_.erase(std::remove_if(shut_.begin(), shut_.end(), [&](const Shut& s) { return now_s > s.until_s; }), shut_.end());
-}
-
-bool ShutWays::leads_past(const std::vector<Point2>& path, double now_s) {
-  forget(now_s);
-  for (const Shut& s : shut_) {
-    if (!s.from_near && s.times < kOften) continue;
-    for (std::size_t i = 1; i < path.size(); ++i) {
-      const Point2 a = path[i - 1], b = path[i];
-      const double x = b.x_m - a.x_m, y = b.y_m - a.y_m, square = x * x + y * y;
-      const double along = square > 0.0 ? std::clamp(((s.at.x_m - a.x_m) * x + (s.at.y_m - a.y_m) * y) / square, 0.0, 1.0) : 0.0;
-      if (std::hypot(a.x_m + along * x - s.at.x_m, a.y_m + along * y - s.at.y_m) < kSame_m) return true;
-    }
-  }
-  return false;
+  shut_.push_back({at, until_s, now_s, 1});
 }
 
 bool ShutWays::has(const Point2& at, double round_m, double now_s) const {
@@ -48,7 +29,7 @@ bool ShutWays::has(const Point2& at, double round_m, double now_s) const {
 }
 
 bool ShutWays::barely_open(const MapLayer& layer, const std::vector<Point2>& path, double clear_m, double now_s) {
-  forget(now_s);
+  shut_.erase(std::remove_if(shut_.begin(), shut_.end(), [&](const Shut& s) { return now_s > s.until_s; }), shut_.end());
   if (shut_.empty()) return false;
   for (std::size_t i = 1; i < path.size(); ++i) {
     const Point2 a = path[i - 1], b = path[i];
@@ -56,8 +37,11 @@ bool ShutWays::barely_open(const MapLayer& layer, const std::vector<Point2>& pat
     for (int k = 0; k <= steps; ++k) {
       const double share = static_cast<double>(k) / steps;
       const Point2 p{a.x_m + share * (b.x_m - a.x_m), a.y_m + share * (b.y_m - a.y_m)};
-      const auto beside = [&](const Shut& s) { return std::hypot(s.at.x_m - p.x_m, s.at.y_m - p.y_m) < kRound_m; };
-      if (layer.clearance_m(p.x_m, p.y_m) < clear_m && std::any_of(shut_.begin(), shut_.end(), beside)) return true;
+      const bool narrow = layer.clearance_m(p.x_m, p.y_m) < clear_m;
+      const auto shut_there = [&](const Shut& s) {
+        return (narrow || s.times >= kOften) && std::hypot(s.at.x_m - p.x_m, s.at.y_m - p.y_m) < kRound_m;
+      };
+      if (std::any_of(shut_.begin(), shut_.end(), shut_there)) return true;
     }
   }
   return false;

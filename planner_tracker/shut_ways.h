@@ -13,14 +13,11 @@ class ShutWays {
  public:
   void clear() { shut_.clear(); }
   /// Found closed, and remembered until then. Again after some seconds counts as another time.
-  /// @param from_near  seen from where there is no doubt
-  void add(const Point2& at, bool from_near, double now_s, double until_s);
+  void add(const Point2& at, double now_s, double until_s);
   /// True if a place within `round_m` of this one was found closed.
   bool has(const Point2& at, double round_m, double now_s) const;
-  /// True if the path leads past a place that was found closed from near, or often: however open it looks, it is not tried again
-  /// as long as there is another way.
-  bool leads_past(const std::vector<Point2>& path, double now_s);
-  /// True if the path leads past a place that was found closed, and is no wider there than `clear_m` on either side.
+  /// True if the path leads past a place that was found closed, and is no wider there than `clear_m` on either side, or however
+  /// wide it looks if it was found closed more than once.
   bool barely_open(const MapLayer& layer, const std::vector<Point2>& path, double clear_m, double now_s);
 
  private:
@@ -28,10 +25,7 @@ class ShutWays {
     Point2 at;
     double until_s, last_s;
     int times;
-    bool from_near;
   };
-  void forget(double now_s);
-
   std::vector<Shut> shut_;
 };
 
