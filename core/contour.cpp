@@ -240,8 +240,9 @@ void merge_newest(const TsdfObservation& o, const Pose2& T_map_robot, RangeScan*
   const double increment = scan->angle_increment_rad;
   static thread_local std::vector<float> newest;
   newest.assign(scan->range_m.size(), kInf);
+  const auto index_of = [&](std::ptrdiff_t ray) { return static_cast<std::size_t>(((ray % rays) + rays) % rays); };
   const auto put = [&](std::ptrdiff_t ray, double range) {
-    float& value = newest[static_cast<std::size_t>(((ray % rays) + rays) % rays)];
+    float& value = newest[index_of(ray)];
     value = std::min(value, static_cast<float>(range));
   };
   bool have_last = false;
@@ -258,7 +259,7 @@ void merge_newest(const TsdfObservation& o, const Pose2& T_map_robot, RangeScan*
     const auto own = static_cast<std::ptrdiff_t>(std::lround((angle - scan->angle_min_rad) / increment));
     if (o.cut(i)) {
       // The map knows where it begins, if it was seen from farther off.
-      if (!(scan->range_m[static_cast<std::size_t>(((own % rays) + rays) % rays)] < static_cast<float>(range))) put(own, range);
+      if (!(scan->range_m[index_of(own)] < static_cast<float>(range))) put(own, range);
       have_last = false;
       continue;
     }

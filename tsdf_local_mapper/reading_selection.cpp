@@ -52,8 +52,7 @@ WeightedPoints& ReadingSelection::select(const TsdfObservation& o, const Pose2& 
   double next = 0.5 * stride;
   int seen = 0;
   for (std::size_t i = 0; i < o.columns(); ++i) {
-    if (std::isnan(o.range_m[i])) continue;
-    if (o.cut(i)) continue;
+    if (std::isnan(o.range_m[i]) || o.cut(i)) continue;
     if (++seen < next) continue;
     next += stride;
     const double x = o.direction_x[i] * o.range_m[i], y = o.direction_y[i] * o.range_m[i];

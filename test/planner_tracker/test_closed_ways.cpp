@@ -157,14 +157,18 @@ TEST(ClosedWay, AWayThatIsFarRoundIsNotTakenBeforeTheRobotHasBeenWhereItSees) {
   EXPECT_LT(keeper.path().remaining_m(), 10.0);
 }
 
+/// Two rooms of 6 x 6 m side by side, joined by a door below and one above.
+OccupancyGrid rooms_with_two_doors(bool lower_open) {
+  OccupancyGrid grid = room(12.0, 6.0);
+  fill(&grid, 5.95, 0.0, 6.05, 6.0, 100);
+  if (lower_open) fill(&grid, 5.95, 0.6, 6.05, 1.5, 0);
+  fill(&grid, 5.95, 4.5, 6.05, 5.4, 0);
+  return grid;
+}
+
 TEST(ClosedWay, WhereAllWaysAreClosedTheyAreLookedAtInTurn) {
   // Two doors. The nearer is shut, and somebody stands in the farther, who leaves when the robot has gone back to the nearer.
-  OccupancyGrid map = room(12.0, 6.0);
-  fill(&map, 5.95, 0.0, 6.05, 6.0, 100);
-  fill(&map, 5.95, 0.6, 6.05, 1.5, 0);
-  fill(&map, 5.95, 4.5, 6.05, 5.4, 0);
-  OccupancyGrid truth = map;
-  fill(&truth, 5.95, 0.6, 6.05, 1.5, 100);
+  const OccupancyGrid map = rooms_with_two_doors(true), truth = rooms_with_two_doors(false);
   ToyWorld world(truth, map, {2.5, 2.4, 0.0}, {});
   const double began_s = world.now_s;
   world.discs.push_back({[=](double t) { return t - began_s < 30.0 ? Point2{6.0, 4.95} : Point2{-5.0, 0.0}; }});
@@ -324,12 +328,7 @@ TEST(ClosedWay, IsLookedAtFromElsewhereIfNothingIsSeenFromHereAndGivenUpInTimeAl
 
 TEST(ClosedWay, WhenEveryWaySeemsClosedTheNextOneIsLookedAtAfterTheNearest) {
   // Two doors. The nearer is shut. Before the farther somebody stood when the robot last saw it, and has left since.
-  OccupancyGrid map = room(12.0, 6.0);
-  fill(&map, 5.95, 0.0, 6.05, 6.0, 100);
-  fill(&map, 5.95, 0.6, 6.05, 1.5, 0);
-  fill(&map, 5.95, 4.5, 6.05, 5.4, 0);
-  OccupancyGrid truth = map;
-  fill(&truth, 5.95, 0.6, 6.05, 1.5, 100);
+  const OccupancyGrid map = rooms_with_two_doors(true), truth = rooms_with_two_doors(false);
   ToyWorld world(truth, map, {2.5, 3.4, 0.6}, {});
   const double began_s = world.now_s;
   world.discs.push_back({[=](double t) { return t - began_s < 2.5 ? Point2{5.7, 4.95} : Point2{-5.0, 0.0}; }});
