@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace knav {
 namespace {
@@ -31,7 +32,7 @@ double mean_share(const std::vector<ScanShare>& shares, double from_s, double to
     sum += s.seen;
     ++count;
   }
-  return count > 0 ? sum / count : 0.0;
+  return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace

@@ -37,6 +37,7 @@ TEST(ParkedAccuracy, TellsWhatTheEstimateDidDuringTheLongestStopAndTenMetresLate
   EXPECT_NEAR(accuracy.later_m, 0.1, 1e-3);  // 1 % of 10 m
   EXPECT_NEAR(accuracy.seen_before, 0.85, 1e-9);  // from 11 s to 71 s
   EXPECT_NEAR(accuracy.seen_after, 0.7, 1e-9);    // from 50 s to 110 s
+  EXPECT_TRUE(std::isnan(parked_accuracy(estimate, truth, {}).seen_after));
 }
 
 TEST(ParkedAccuracy, IsEmptyWithoutPoses) { EXPECT_EQ(parked_accuracy({}, {}, {}).parked_s, 0.0); }
