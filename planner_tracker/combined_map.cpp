@@ -137,7 +137,12 @@ void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_lo
   CellState by_value[256];
   for (int v = -128; v < 128; ++v) by_value[v + 128] = local_state(static_cast<std::int8_t>(v));
 
-  // Each map cell asks the local cell its centre lies in; coordinates advance by constant steps along a row.
+  // Free and unknown: each map cell asks the local cell its centre lies in; coordinates advance by constant steps
+  // along a row. Occupied: each local cell marks the one map cell its own centre lies in. Asked the first way as
+  // well, it would mark up to four, and lanes would be a cell narrower or wider by how the local map lies; the
+  // holes of one cell that this leaves in a turned wall are far narrower than any footprint. Only a map of much
+  // finer cells is asked both ways: its walls would be dots.
+  const bool finer = g.resolution_m < 0.75 * l.resolution_m;
   const Pose2 T_local_map = T_map_local.inverse();
   const double step = g.resolution_m / l.resolution_m;
   const double step_x = std::cos(T_local_map.yaw_rad) * step, step_y = std::sin(T_local_map.yaw_rad) * step;
@@ -148,12 +153,11 @@ void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_lo
                      static_cast<std::size_t>(iy - window.y0) * static_cast<std::size_t>(window.width());
     for (int i = 0; i < window.width(); ++i, x += step_x, y += step_y) {
       const bool inside = x >= 0.0 && y >= 0.0 && x < l.width_cells && y < l.height_cells;
-      out[i] = inside ? by_value[local.value[l.index(static_cast<int>(x), static_cast<int>(y))] + 128]
-                      : CellState::kUnknown;
+      const CellState state = inside ? by_value[local.value[l.index(static_cast<int>(x), static_cast<int>(y))] + 128]
+                                     : CellState::kUnknown;
+      out[i] = state == CellState::kOccupied && !finer ? CellState::kFree : state;
     }
   }
-  // A turned wall one cell thick would get holes that way, so each occupied cell also marks the cell it lies
-  // in.
   const double c = std::cos(T_map_local.yaw_rad), s = std::sin(T_map_local.yaw_rad);
   for (int iy = 0; iy < l.height_cells; ++iy) {
     for (int ix = 0; ix < l.width_cells; ++ix) {
@@ -195,6 +199,17 @@ const MapLayer& CombinedMap::permissive(const std::vector<Point2>& closed, doubl
   return permissive_;
 }
 
+bool CombinedMap::seen(const Point2& p) const {
+  const int ix = global_.geometry.cell_x(p.x_m), iy = global_.geometry.cell_y(p.y_m);
+  const CellWindow& w = local_window_;
+  return !w.empty() && ix >= w.x0 && ix < w.x1 && iy >= w.y0 && iy < w.y1 && local_cell(ix, iy) != CellState::kUnknown;
+}
+
+CellState CombinedMap::local_cell(int ix, int iy) const {
+  return local_cells_[static_cast<std::size_t>(iy - local_window_.y0) * static_cast<std::size_t>(local_window_.width()) +
+                      static_cast<std::size_t>(ix - local_window_.x0)];
+}
+
 bool CombinedMap::on_local(int ix, int iy) const {
   if (local_geometry_.width_cells == 0) return true;
   const Point2 p = T_local_map_ * Point2{global_.geometry.center_x_m(ix), global_.geometry.center_y_m(iy)};
@@ -206,8 +221,7 @@ CellState CombinedMap::held(int ix, int iy) const {
   const CellWindow& w = local_window_;
   CellState local = CellState::kUnknown;
   if (!w.empty() && ix >= w.x0 && ix < w.x1 && iy >= w.y0 && iy < w.y1) {
-    local = local_cells_[static_cast<std::size_t>(iy - w.y0) * static_cast<std::size_t>(w.width()) +
-                         static_cast<std::size_t>(ix - w.x0)];
+    local = local_cell(ix, iy);
   }
   const std::size_t i = global_.geometry.index(ix, iy);
   const bool showed = combined_.state[i] == CellState::kOccupied && global_.state[i] != CellState::kOccupied;

@@ -75,6 +75,8 @@ class CombinedMap {
   const MapLayer& permissive(const std::vector<Point2>& closed = {}, double round_m = 0.0);
   /// The cells that the newest local map covers, as far as it knows anything.
   const CellWindow& local_window() const { return local_window_; }
+  /// True if the newest local map knows what is there. (Off it, and where it has been reset, combined() is the global map.)
+  bool seen(const Point2& p) const;
   /// Cells whose state changed in the last call.
   std::size_t changed_cells() const { return changed_cells_; }
 
@@ -83,6 +85,7 @@ class CombinedMap {
   void sample_local(const OccupancyGrid& local, const Pose2& T_map_local, const CellWindow& window);
   void apply(const CellWindow& window);
   bool on_local(int ix, int iy) const;
+  CellState local_cell(int ix, int iy) const;  ///< of a cell in `local_window_`
   CellState held(int ix, int iy) const;
   void put(int ix, int iy, CellState now, CellWindow* dirty);
   void forget(CellWindow* dirty);

@@ -10,6 +10,7 @@ constexpr double kStep_m = 0.04;
 constexpr double kNearEnd_m = 0.4;
 constexpr double kPast_m = 0.4;        ///< straight on, to be past what stands right beside the robot
 constexpr double kPastStep_rad = 0.1;
+constexpr double kPassed_m = 0.12;     ///< before the end of that
 constexpr double kTurned_rad = 0.03;
 
 }  // namespace
@@ -22,7 +23,7 @@ PathTracker::PathTracker(const PlannerTrackerConfig& config)
       hard_radius_m_(outline_.inscribed_m() + config.clearance.hard_m),
       preferred_radius_m_(outline_.inscribed_m() + config.clearance.preferred_m) {}
 
-void PathTracker::reset() { turning_ = false; }
+void PathTracker::reset() { turning_ = passing_ = false; }
 
 double PathTracker::approach(double from, double to, double step) const {
   return to > from ? std::min(to, from + step) : std::max(to, from - step);
@@ -107,16 +108,23 @@ double PathTracker::bearing_past(const TrackInput& input, double bearing_rad) co
   return 0.0;
 }
 
+bool PathTracker::still_passes(const TrackInput& input) const {
+  const Point2 p = input.T_map_base.inverse() * past_;
+  const double distance = std::hypot(p.x_m, p.y_m);
+  return p.x_m > kPassed_m && straight_free_m(input, std::atan2(p.y_m, p.x_m), distance) > distance - 2.0 * kStep_m;
+}
+
 TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
   const TrackingConfig& t = config_.tracking;
   const double share = std::clamp(input.v_mps / config_.max_vel_x, 0.0, 1.0);
+  const Pose2 T_base_map = input.T_map_base.inverse();
+  passing_ = passing_ && still_passes(input);
   double lookahead = t.lookahead_m * (0.6 + 0.4 * share) + path.offset_m();
   // Not across a corner: the straight line to the point must be as open as the robot's own place allows.
-  const Pose2 T_base_map = input.T_map_base.inverse();
   const double here = point_clearance_m(input, 0.0, 0.0);
   const double wanted = std::min({hard_radius_m_ - 0.02, here - 0.005});
-  Point2 target;
-  for (;; lookahead *= 0.75) {
+  Point2 target = T_base_map * past_;
+  for (; !passing_; lookahead *= 0.75) {
     target = T_base_map * path.point_at(path.at_m() + lookahead);
     const double length = std::hypot(target.x_m, target.y_m);
     bool open = true;
@@ -129,7 +137,7 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
   const double bearing = std::atan2(target.y_m, target.x_m);
 
   const bool near_end = path.remaining_m() < kNearEnd_m;
-  const double turn_first = near_end ? 0.6 * t.turn_first_rad : t.turn_first_rad;
+  const double turn_first = passing_ ? kPastStep_rad : near_end ? 0.6 * t.turn_first_rad : t.turn_first_rad;
   if (turning_ ? std::abs(bearing) > t.turned_rad : std::abs(bearing) > turn_first) {
     turning_ = true;
     // Half a turn may go either way: keep to the one begun.
@@ -140,10 +148,10 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
 
   double curvature = 2.0 * std::sin(bearing) / std::max(distance, 0.1);
   const double look = std::max(0.5, config_.max_vel_x * t.horizon_s);
-  const double reach = std::min(look, path.remaining_m() + 0.02);
+  const double reach = std::min(look, passing_ ? distance : path.remaining_m() + 0.02);
   Rollout ahead = roll_out(input, curvature, reach, 0.6, false);
   const double enough = std::min(reach - 0.01, 0.35);
-  if (ahead.free_m < enough) {
+  if (ahead.free_m < enough && !passing_) {
     // Something the plan does not know yet. An arc beside the nominal one that stays near the path?
     double best = 1e9, best_curvature = curvature;
     Rollout best_rollout;
@@ -167,8 +175,13 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
     }
   }
   if (ahead.free_m < 0.06 && reach > 0.06) {
+    passing_ = false;
     const double past = bearing_past(input, bearing);
-    if (std::abs(past) > kTurned_rad) return turn(input, past);
+    if (std::abs(past) > kTurned_rad) {
+      past_ = input.T_map_base * Point2{kPast_m * std::cos(past), kPast_m * std::sin(past)};
+      passing_ = turning_ = true;
+      return turn(input, past);
+    }
     TrackOutput out = std::abs(bearing) > t.turned_rad ? turn(input, bearing) : stop(input);
     out.v_mps = 0.0;
     out.kind = TrackOutput::Kind::kBlocked;

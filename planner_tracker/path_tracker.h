@@ -66,6 +66,9 @@ class PathTracker {
   /// Where no arc from the robot's heading is free, as beside a corner that it touches all but: the heading next to the path's from
   /// which it can go straight on past that; 0 if there is none.
   double bearing_past(const TrackInput& input, double bearing_rad) const;
+  /// True while the robot is on its straight way past that. Who let the path steer again right after the turn would be led back
+  /// to the corner, and turn to and fro before it.
+  bool still_passes(const TrackInput& input) const;
   /// What moves nearby allows.
   double speed_near_moving_mps(const TrackInput& input, const Rollout& ahead) const;
   /// True off the cells the map calls free. A robot that stands in the midst of unknown keeps clearance 0
@@ -80,6 +83,8 @@ class PathTracker {
   double stop_radius_m_;  ///< the same as a clearance_m()
   double hard_radius_m_, preferred_radius_m_;
   bool turning_ = false;
+  bool passing_ = false;
+  Point2 past_;  ///< passing_: in the map, where to
 };
 
 }  // namespace knav

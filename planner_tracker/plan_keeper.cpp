@@ -259,7 +259,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     const bool clearly_better = new_cost < now_cost * (1.0 - config_.planning.switch_gain) &&
                                 new_cost < now_cost - config_.planning.switch_gain_m;
     const auto barely_open = [&] {
-      return kind == Outcome::kToGoal && shut_.barely_open(layer, result_.path, config_.hard_radius_m() + kWider_m, now_s);
+      return kind == Outcome::kToGoal && shut_.barely_open(map, result_.path, config_.hard_radius_m() + kWider_m, now_s);
     };
     if (!same_end || !std::isfinite(old) || (clearly_better && !barely_open())) take(result_.path);
     path_kind_ = kind;

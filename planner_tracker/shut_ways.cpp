@@ -28,9 +28,10 @@ bool ShutWays::has(const Point2& at, double round_m, double now_s) const {
   });
 }
 
-bool ShutWays::barely_open(const MapLayer& layer, const std::vector<Point2>& path, double clear_m, double now_s) {
+bool ShutWays::barely_open(const CombinedMap& map, const std::vector<Point2>& path, double clear_m, double now_s) {
   shut_.erase(std::remove_if(shut_.begin(), shut_.end(), [&](const Shut& s) { return now_s > s.until_s; }), shut_.end());
   if (shut_.empty()) return false;
+  const MapLayer& layer = map.combined();
   for (std::size_t i = 1; i < path.size(); ++i) {
     const Point2 a = path[i - 1], b = path[i];
     const int steps = 1 + static_cast<int>(std::hypot(b.x_m - a.x_m, b.y_m - a.y_m) / layer.geometry.resolution_m);
@@ -39,7 +40,7 @@ bool ShutWays::barely_open(const MapLayer& layer, const std::vector<Point2>& pat
       const Point2 p{a.x_m + share * (b.x_m - a.x_m), a.y_m + share * (b.y_m - a.y_m)};
       const bool narrow = layer.clearance_m(p.x_m, p.y_m) < clear_m;
       const auto shut_there = [&](const Shut& s) {
-        return (narrow || s.times >= kOften) && std::hypot(s.at.x_m - p.x_m, s.at.y_m - p.y_m) < kRound_m;
+        return (narrow || s.times >= kOften || !map.seen(s.at)) && std::hypot(s.at.x_m - p.x_m, s.at.y_m - p.y_m) < kRound_m;
       };
       if (std::any_of(shut_.begin(), shut_.end(), shut_there)) return true;
     }

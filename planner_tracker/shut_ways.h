@@ -16,9 +16,9 @@ class ShutWays {
   void add(const Point2& at, double now_s, double until_s);
   /// True if a place within `round_m` of this one was found closed.
   bool has(const Point2& at, double round_m, double now_s) const;
-  /// True if the path leads past a place that was found closed, and is no wider there than `clear_m` on either side, or however
-  /// wide it looks if it was found closed more than once.
-  bool barely_open(const MapLayer& layer, const std::vector<Point2>& path, double clear_m, double now_s);
+  /// True if the path leads past a place that was found closed, and is no wider there than `clear_m` on either side; or however
+  /// wide it looks if it was found closed more than once, or is off the local map: then it has been forgotten, not seen open.
+  bool barely_open(const CombinedMap& map, const std::vector<Point2>& path, double clear_m, double now_s);
 
  private:
   struct Shut {

@@ -27,30 +27,50 @@ void CloseObstacles::update(const DepthProfile& profile, const Pose2& T_local_ca
   if (config_.distance_m <= 0.0 || profile.height_class.size() != profile.z_m.size()) return;
   find_blind_columns(profile);
   forget(profile, T_local_camera);
-  const double apart_px = std::max(1.0, kApart_m * profile.fx_px / config_.distance_m);
-  double next = 0.0;
   for (std::size_t u = 0; u < lost_.size(); ++u) {
-    const auto column = static_cast<double>(u);
-    if (lost_[u] == 0) {
-      next = column;
+    known_depth_m_[u] = lost_[u] != 0 ? known_depth(T_local_camera, left_per_m(profile, u), grid) : 0.0f;
+  }
+  for (std::size_t first = 0; first < lost_.size();) {
+    if (!hides(first)) {
+      ++first;
       continue;
     }
-    if (column < next) continue;
-    next = column + apart_px;
-    const double left_per_m = -(column - profile.cx_px) / profile.fx_px;
-    if (is_known(T_local_camera, left_per_m, grid)) continue;
-    hold(T_local_camera * Point2{config_.distance_m, left_per_m * config_.distance_m}, profile.stamp_s);
+    std::size_t end = first;
+    while (end < lost_.size() && hides(end)) ++end;
+    hold_between(profile, T_local_camera, first, end);
+    first = end;
   }
 }
 
-/// Whether the map has something where the camera is blind, that would hide what is behind.
-bool CloseObstacles::is_known(const Pose2& T_local_camera, double left_per_m, const TsdfGrid& grid) {
+double CloseObstacles::left_per_m(const DepthProfile& profile, std::size_t column) {
+  return -(static_cast<double>(column) - profile.cx_px) / profile.fx_px;
+}
+
+/// The depth of what the map has where the camera is blind, that would hide what is behind; infinite for nothing.
+float CloseObstacles::known_depth(const Pose2& T_local_camera, double left_per_m, const TsdfGrid& grid) {
   for (double depth_m = kLooksFrom_m; depth_m <= kSeesFrom_m; depth_m += 0.5 * grid.resolution_m()) {
     const Point2 p = T_local_camera * Point2{depth_m, left_per_m * depth_m};
     const int ix = grid.cell_of(p.x_m), iy = grid.cell_of(p.y_m);
-    if (grid.contains(ix, iy) && grid.known(ix, iy) && grid.value(ix, iy) <= 0) return true;
+    if (grid.contains(ix, iy) && grid.known(ix, iy) && grid.value(ix, iy) <= 0) return static_cast<float>(depth_m);
   }
-  return false;
+  return std::numeric_limits<float>::infinity();
+}
+
+/// Whether a column is blind for something that the map does not have.
+bool CloseObstacles::hides(std::size_t column) const { return lost_[column] != 0 && std::isinf(known_depth_m_[column]); }
+
+/// Holds what stands before the columns from first to end, unless they are no more than the shadow of the known surface
+/// beside them.
+void CloseObstacles::hold_between(const DepthProfile& profile, const Pose2& T_local_camera, std::size_t first, std::size_t end) {
+  float beside_m = std::numeric_limits<float>::infinity();
+  if (first > 0 && lost_[first - 1] != 0) beside_m = known_depth_m_[first - 1];
+  if (end < lost_.size() && lost_[end] != 0) beside_m = std::min(beside_m, known_depth_m_[end]);
+  const double shadow_px = kBaseline_m * profile.fx_px / static_cast<double>(beside_m);
+  if (static_cast<double>(end - first) < static_cast<double>(fewest_columns(profile)) + shadow_px) return;
+  const auto apart_px = static_cast<std::size_t>(std::max(1.0, std::ceil(kApart_m * profile.fx_px / config_.distance_m)));
+  for (std::size_t u = first; u < end; u += apart_px) {
+    hold(T_local_camera * Point2{config_.distance_m, left_per_m(profile, u) * config_.distance_m}, profile.stamp_s);
+  }
 }
 
 /// How many columns beside a run of blind ones the shadow may fill that a near surface throws: projector and camera look
@@ -65,6 +85,10 @@ std::size_t CloseObstacles::shadow_columns(const DepthProfile& profile, std::siz
   return static_cast<std::size_t>(std::min(kBaseline_m * profile.fx_px / static_cast<double>(nearest_m), static_cast<double>(profile.z_m.size())));
 }
 
+std::size_t CloseObstacles::fewest_columns(const DepthProfile& profile) const {
+  return static_cast<std::size_t>(std::max(1.0, std::tan(config_.width_deg * kPi / 180.0) * profile.fx_px));
+}
+
 bool CloseObstacles::goes_blind(std::size_t column, double stamp_s) const {
   return lost_[column] != 0 || stamp_s - shown_s_[column] <= kSuddenly_s;
 }
@@ -74,8 +98,9 @@ void CloseObstacles::find_blind_columns(const DepthProfile& profile) {
   if (shown_s_.size() != columns) {
     shown_s_.assign(columns, kNever);
     lost_.assign(columns, 0);
+    known_depth_m_.assign(columns, 0.0f);
   }
-  const auto fewest = static_cast<std::size_t>(std::max(1.0, std::tan(config_.width_deg * kPi / 180.0) * profile.fx_px));
+  const std::size_t fewest = fewest_columns(profile);
   for (std::size_t first = 0; first < columns;) {
     if (profile.height_class[first] != HeightClass::kBlind) {
       shown_s_[first] = profile.stamp_s;

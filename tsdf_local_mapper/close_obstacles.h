@@ -29,8 +29,9 @@ struct CloseObstaclesConfig {
 /// A Kinect answers nothing nearer than half a metre, and the robot stops within half a metre: who steps into its way from
 /// the side, or is met in a turn, is in no reading. But he hides the floor and all behind him. A column counts from when it
 /// shows nothing, if it showed something half a second before, until it shows something again: columns that never
-/// show anything (a registered image's border) do not count. Nor do those before which the map has a surface so near: a robot
-/// that turns beside a wall knows what it does not see.
+/// show anything (a registered image's border) do not count. Nor do those before which the map has a surface so near, nor its
+/// shadow beside it (projector and camera look past its edge from two places): a robot that turns beside a wall, or drives
+/// through a door, knows what it does not see.
 class CloseObstacles {
  public:
   explicit CloseObstacles(const CloseObstaclesConfig& config) : config_(config) {}
@@ -45,9 +46,13 @@ class CloseObstacles {
  private:
   void find_blind_columns(const DepthProfile& profile);
   static std::size_t shadow_columns(const DepthProfile& profile, std::size_t first, std::size_t end);
+  std::size_t fewest_columns(const DepthProfile& profile) const;
   bool goes_blind(std::size_t column, double stamp_s) const;
   void forget(const DepthProfile& profile, const Pose2& T_local_camera);
-  static bool is_known(const Pose2& T_local_camera, double left_per_m, const TsdfGrid& grid);
+  static double left_per_m(const DepthProfile& profile, std::size_t column);
+  static float known_depth(const Pose2& T_local_camera, double left_per_m, const TsdfGrid& grid);
+  bool hides(std::size_t column) const;
+  void hold_between(const DepthProfile& profile, const Pose2& T_local_camera, std::size_t first, std::size_t end);
   void hold(const Point2& in_local, double stamp_s);
 
   struct Held {
@@ -57,6 +62,7 @@ class CloseObstacles {
   CloseObstaclesConfig config_;
   std::vector<double> shown_s_;     ///< per column: when it last showed something
   std::vector<std::uint8_t> lost_;  ///< per column: it stopped doing so
+  std::vector<float> known_depth_m_;  ///< per lost column: of the surface that the map has there
   std::vector<Held> held_;
 };
 

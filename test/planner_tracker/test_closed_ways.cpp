@@ -115,6 +115,23 @@ TEST_F(TwoDoors, AWayFoundShutMustBeWiderThanTheRobotToTurnBackFor) {
   EXPECT_FALSE(goes_round());
 }
 
+TEST_F(TwoDoors, AWayFoundShutThatHasGoneOffTheLocalMapIsNotTurnedBackForUntilItIsSeenOpen) {
+  // On the long way round the local map loses the door, and the combined map has it open again, as the building's map has it.
+  look(0.0, 1.0);
+  look(0.0, config_.planning.hold_s + kToSee_s);
+  ASSERT_TRUE(goes_round());
+  OccupancyGrid unknown = rooms(1.0);
+  std::fill(unknown.value.begin(), unknown.value.end(), static_cast<std::int8_t>(-1));
+  for (double t = 12.0; t < 30.0; t += 1.0) {
+    map_.set_local(unknown, Pose2{});
+    ASSERT_EQ(map_.combined().at(map_.global().geometry.cell_x(6.0), map_.global().geometry.cell_y(3.0)), CellState::kFree);
+    EXPECT_EQ(keeper_.replan(map_, {3.0, 3.0, 0.0}, {10.0, 3.0}, 100.0 + t), PlanKeeper::Outcome::kToGoal);
+    EXPECT_TRUE(goes_round()) << t;
+  }
+  look(0.9, 31.0);
+  EXPECT_FALSE(goes_round());
+}
+
 TEST_F(TwoDoors, AWayFoundShutTwiceIsNotTurnedBackForThoughItLooksOpen) {
   // What leaves half a metre beside a wall looks open from 6 m and closed from 3 m: in Willow Garage the robot turned to and fro
   // before it until its time was over.

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/distance_transform.h"
@@ -87,6 +88,32 @@ struct Corridor {
   bool closed() const { return map.combined().clearance_m(12.0, 1.0) < 0.1; }
   CombinedMap map;
 };
+
+TEST(Overlay, ALaneKeepsItsWidthHoweverTheLocalMapLies) {
+  // Marked twice, each box was up to a cell thicker, by the shift of the local map's cells: a lane of 0.55 m was open in one frame's
+  // map and closed in the next.
+  const OccupancyGrid global = room(4.0, 4.0);
+  OccupancyGrid local = room(3.0, 3.0);
+  local.value.assign(local.value.size(), 0);
+  fill(&local, 1.0, 0.5, 2.0, 1.2, 100);
+  fill(&local, 1.0, 1.75, 2.0, 2.5, 100);
+  const auto boxes = std::count(local.value.begin(), local.value.end(), static_cast<std::int8_t>(100));
+  const auto walls = std::count(global.value.begin(), global.value.end(), static_cast<std::int8_t>(100));
+  for (int k = 0; k < 20; ++k) {
+    CombinedMap map(0.5, 65, 25);
+    map.set_global({}, global, {});
+    const Pose2 T_map_local{0.3 + 0.0073 * k, 0.3 + 0.0041 * k, 0.002 * k};
+    map.set_local(local, T_map_local);
+    const auto& state = map.combined().state;
+    EXPECT_LE(std::count(state.begin(), state.end(), CellState::kOccupied), walls + boxes) << k;
+    const Point2 middle = T_map_local * Point2{1.5, 1.475};
+    int free = 0;
+    for (int iy = map.combined().geometry.cell_y(middle.y_m - 0.5); iy < map.combined().geometry.cell_y(middle.y_m + 0.5); ++iy) {
+      free += map.combined().at(map.combined().geometry.cell_x(middle.x_m), iy) == CellState::kFree ? 1 : 0;
+    }
+    EXPECT_NEAR(free, 11, 1) << k;
+  }
+}
 
 TEST(Overlay, WhatWasClosedStaysSoOffTheLocalMapsEdge) {
   Corridor corridor(60.0);

@@ -157,6 +157,22 @@ TEST_F(CloseObstacleTest, TheShadowBesideANearThingIsNobody) {
   EXPECT_NEAR(range_m(0.05), 0.40, 0.02);
 }
 
+TEST_F(CloseObstacleTest, TheShadowBesideAKnownThingTooNearToSeeIsNobody) {
+  // A door post that the map has, 0.47 m before the camera after the drive: a shadow of up to 0.075 m x 585 px / 0.47 m = 93 columns.
+  world_.box(1.2, -2.0, 1.4, 0.0);
+  look(30);
+  look(29, 0.0, 0.68 / 29);
+  hole_from_ = 320 - 90;
+  hole_to_ = 320;
+  look(1, 0.0, 0.0);
+  EXPECT_NEAR(range_m(-0.1), 0.52, 0.04) << "the post";
+  EXPECT_GT(range_m(0.05), 2.0f);
+  EXPECT_GT(range_m(0.12), 2.0f);
+  hole_from_ = 320 - 150;
+  look(1);
+  EXPECT_NEAR(range_m(0.05), 0.40, 0.02) << "wider than any shadow";
+}
+
 TEST_F(CloseObstacleTest, ACoveredCameraStopsTheRobotAndANewEpochForgets) {
   look(30);
   hole_to_ = 640;
