@@ -20,6 +20,7 @@ constexpr double kBeginning_m = 0.5;  ///< of a path, for its direction
 constexpr double kStandsBefore_m = 0.6;  ///< what closes a way may reach this far before the point where it does
 constexpr double kAside_m = 4.0;    ///< of detour, to look at a way straight and not along the wall, from where a door that has opened looks shut
 constexpr double kThrough_m = 0.5;  ///< beyond where it is closed, for a way's direction there
+constexpr int kMostPassed = 3;  ///< on a way; each is a search
 constexpr int kDirections = 24;
 constexpr int kMostTried = 4;
 constexpr double kUnhurried = 1.5;  ///< times as long as at full speed
@@ -138,6 +139,29 @@ bool PlanKeeper::cut_at_blockage(const MapLayer& layer, const MapLayer& unchange
     }
   }
   return false;
+}
+
+void PlanKeeper::pass_by(const MapLayer& layer, const Point2& robot, std::vector<Point2>* way) {
+  const double step = 0.5 * layer.geometry.resolution_m;
+  for (int passed = 0; passed < kMostPassed; ++passed) {
+    Path line;
+    line.set(*way);
+    const auto open_at = [&](double along_m) { return planner_.open(layer, line.point_at(along_m)); };
+    double closed_m = 2.0 * step;
+    while (closed_m < line.length_m() && open_at(closed_m)) closed_m += step;
+    double beyond_m = closed_m + kThrough_m;
+    while (beyond_m < line.length_m() && !open_at(beyond_m)) beyond_m += step;
+    if (beyond_m >= line.length_m()) return;
+    planner_.plan(layer, robot, line.point_at(beyond_m), &result_);
+    if (result_.code != PlanCode::kOk || result_.cost_m > beyond_m + kAside_m) return;
+    std::vector<Point2> by = result_.path;
+    double along_m = 0.0;
+    for (std::size_t i = 1; i < way->size(); ++i) {
+      along_m += std::hypot((*way)[i].x_m - (*way)[i - 1].x_m, (*way)[i].y_m - (*way)[i - 1].y_m);
+      if (along_m > beyond_m) by.push_back((*way)[i]);
+    }
+    way->swap(by);
+  }
 }
 
 bool PlanKeeper::looks_at_it(const MapLayer& unchanged, const Point2& from) const {
@@ -286,6 +310,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     return Outcome::kNoPath;
   }
   std::vector<Point2> way = result_.path;
+  pass_by(layer, robot, &way);
   if (!cut_at_blockage(layer, unchanged, false, &way)) at_ = goal;
   const auto same_place = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kSamePlace_m; };
   if (!same_place(last_at_)) looks_ = 0;

@@ -72,6 +72,8 @@ class PlanKeeper {
   /// A way's direction beyond a point of its segment from way[segment - 1] to way[segment]. There it leads through what is
   /// closed; before, it may come along the wall.
   static Point2 direction_beyond(const std::vector<Point2>& way, std::size_t segment, const Point2& p);
+  /// Where the layer closes a way of the unchanged map only for the line that it takes there, leads it past by another.
+  void pass_by(const MapLayer& layer, const Point2& robot, std::vector<Point2>* way);
   /// Finds where the layer closes a way of the unchanged map (at_), and keeps the way's beginning up to where the robot
   /// can look at that from look_distance_m, or nearer where corners hide it. False if the layer does not close it.
   /// @param kept  the way was taken, and counts as open where it is a little narrower

@@ -195,6 +195,28 @@ TEST(ClosedWay, WhereAllWaysAreClosedTheyAreLookedAtInTurn) {
   EXPECT_EQ(world.collisions, 0);
 }
 
+TEST(ClosedWay, AThingInTheWayThatCanBePassedIsNotWhatClosesIt) {
+  // A box lies on the straight way to a door that is shut. What is to be looked at is the door: a robot that took the box for it stood
+  // before the box, in a lane that was open, and gave up.
+  OccupancyGrid map = room(12.0, 6.0);
+  fill(&map, 8.95, 0.0, 9.05, 6.0, 100);
+  OccupancyGrid shut = map;
+  fill(&map, 8.95, 2.5, 9.05, 3.5, 0);
+  for (const double box_y_m : {2.6, 2.8, 3.0}) {
+    OccupancyGrid now = shut;
+    fill(&now, 4.0, box_y_m, 4.4, box_y_m + 0.4, 100);
+    const PlannerTrackerConfig config;
+    CombinedMap combined(config.preferred_radius_m() + 0.2, config.clearance.occupied_threshold, config.clearance.free_threshold);
+    combined.set_global({}, map, {});
+    combined.set_local(now, Pose2{});
+    PlanKeeper keeper(config);
+    keeper.set_map(combined);
+    ASSERT_EQ(keeper.replan(combined, {2.0, 3.0, 0.0}, {11.0, 3.0}, 100.0), PlanKeeper::Outcome::kToBlockage);
+    EXPECT_NEAR(keeper.at().x_m, 8.7, 0.15) << box_y_m;
+    EXPECT_NEAR(distance(keeper.path().end(), keeper.at()), config.planning.look_distance_m, 0.1) << box_y_m;
+  }
+}
+
 TEST(ClosedWay, ALaneThatAWallsCellsNarrowStaysOpenForTheRobotOnItsWayThere) {
   // A wall across a room, aslant: with these gaps on either side of the straight way the nearest of its cells is 0.22 m off, and a
   // new way needs 0.25 m.
