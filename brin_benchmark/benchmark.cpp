@@ -149,7 +149,7 @@ RunRecord run_sequence(BenchmarkRobot& robot, const Pose2& T_map_start, const st
       result.collisions_at.push_back({robot.now_s() - start_s, T_world_base.x_m, T_world_base.y_m});
       if (recorder == nullptr) return;
       recorder->failure(fmt::format("{}_{}_collision_{}", i + 1, waypoints[i].name, result.collisions_at.size()),
-                        fmt::format("The robot ran into something at ({:.2f}, {:.2f}) m of the world.", T_world_base.x_m,
+                        fmt::format("The robot ran into {} at ({:.2f}, {:.2f}) m of the world.", robot.simulator().nearest_thing(), T_world_base.x_m,
                                     T_world_base.y_m));
     };
     result.legs.push_back(drive_leg(robot, waypoints[i], [&] { progress("run", fraction); }, collided));

@@ -88,7 +88,7 @@ class GoalDriver {
     if (loop_.simulator().contacts().collisions > collisions && recorder_ != nullptr) {
       const Pose2& at = loop_.simulator().T_world_base();
       recorder_->failure(label_ + "_collision",
-                         fmt::format("The robot ran into something at ({:.2f}, {:.2f}) m of the world.", at.x_m, at.y_m));
+                         fmt::format("The robot ran into {} at ({:.2f}, {:.2f}) m of the world.", loop_.simulator().nearest_thing(), at.x_m, at.y_m));
     }
     if (watching_.due(loop_.now_s())) {
       const std::size_t plans = loop_.stack().planner().plans();

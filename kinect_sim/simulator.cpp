@@ -128,6 +128,23 @@ double Simulator::gap_m(const Pose2& pose) const {
   return std::min(clearance - config_.robot.radius_m, over_stairs_m);
 }
 
+std::string Simulator::nearest_thing() const {
+  const Pose2& robot = robot_.T_world_base();
+  double least = collision_map_.clearance_m({robot.x_m, robot.y_m});
+  std::string name = "something solid";
+  for (std::size_t i = 0; i < dynamic_.people.size(); ++i) {
+    const PersonState& person = dynamic_.people[i];
+    const double away = distance_m(person.T_world_person, robot) - person.radius_m;
+    if (away >= least) continue;
+    least = away;
+    name = fmt::format("{} (at ({:.2f}, {:.2f}) m, {})", world_.people[i].name.empty() ? "somebody" : world_.people[i].name,
+                       person.T_world_person.x_m, person.T_world_person.y_m,
+                       person.speed_mps > 0.0 ? fmt::format("walking at {:.2f} m/s", person.speed_mps) : "standing");
+  }
+  if (collision_map_.stairs_distance_m({robot.x_m, robot.y_m}) + 0.4 * config_.robot.radius_m < least) name = "a stair's edge";
+  return name;
+}
+
 void Simulator::step() {
   ++steps_;
   const double age_s = static_cast<double>(steps_ - command_step_) * config_.step_s;

@@ -70,6 +70,8 @@ class Simulator {
   const Pose2& T_odom_base() const { return robot_.T_odom_base(); }
   const RobotModel& robot() const { return robot_; }
   const std::vector<PersonState>& people() const { return dynamic_.people; }
+  /// In words, for reports: what is nearest to the robot.
+  std::string nearest_thing() const;
   const ContactCount& contacts() const { return contacts_; }
   double distance_driven_m() const { return distance_driven_m_; }
 

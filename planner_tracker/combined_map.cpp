@@ -252,6 +252,13 @@ void CombinedMap::forget(CellWindow* dirty) {
   remembered_.resize(kept);
 }
 
+void CombinedMap::forget_round(const Point2& p, double round_m) {
+  for (Remembered& r : remembered_) {
+    if (std::hypot(global_.geometry.center_x_m(r.ix) - p.x_m, global_.geometry.center_y_m(r.iy) - p.y_m) <= round_m) r.until_s = now_s_;
+  }
+  apply({});
+}
+
 void CombinedMap::apply(const CellWindow& window) {
   changed_cells_ = 0;
   CellWindow dirty;

@@ -65,6 +65,8 @@ class CombinedMap {
   /// Replaces the previous local map. Clearances are recomputed round the cells that changed.
   void set_local(const OccupancyGrid& local, const Pose2& T_map_local, double now_s = 0.0);
   void clear_local();
+  /// Forgets what is remembered off the local map within this distance of a point.
+  void forget_round(const Point2& p, double round_m);
 
   bool empty() const { return global_.state.empty(); }
   const MapLayer& global() const { return global_; }  ///< with keepout, without local map

@@ -10,6 +10,7 @@ constexpr double kStep_m = 0.04;
 constexpr double kNearEnd_m = 0.4;
 constexpr double kPast_m = 0.4;        ///< straight on, to be past what stands right beside the robot
 constexpr double kPastStep_rad = 0.1;
+constexpr double kAlong = 0.3;         ///< of turned_rad, where the turn is for looking along the way
 constexpr double kPassed_m = 0.12;     ///< before the end of that
 constexpr double kTurned_rad = 0.03;
 
@@ -138,8 +139,9 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
   const double bearing = std::atan2(target.y_m, target.x_m);
 
   const bool near_end = path.remaining_m() < kNearEnd_m;
-  const double turn_first = passing_ ? kPastStep_rad : near_end ? 0.6 * t.turn_first_rad : t.turn_first_rad;
-  if (turning_ ? std::abs(bearing) > t.turned_rad : std::abs(bearing) > turn_first) {
+  const bool unseen = (turning_ || (std::abs(bearing) > t.unseen_turn_first_rad && std::abs(bearing) <= t.turn_first_rad)) && sweeps_unseen(input, target);
+  const double turn_first = unseen ? t.unseen_turn_first_rad : passing_ ? kPastStep_rad : near_end ? 0.6 * t.turn_first_rad : t.turn_first_rad;
+  if (turning_ ? std::abs(bearing) > (unseen ? kAlong : 1.0) * t.turned_rad : std::abs(bearing) > turn_first) {
     turning_ = true;
     // Half a turn may go either way: keep to the one begun.
     const bool about_face = std::abs(bearing) > 2.8 && std::abs(input.w_radps) > 0.1;

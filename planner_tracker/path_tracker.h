@@ -16,6 +16,7 @@ struct TrackInput {
   double v_mps = 0.0, w_radps = 0.0;  ///< commanded last
   double dt_s = 0.05;
   const MapLayer* layer = nullptr;  ///< the combined map; null where only the scan is to be believed
+  const CombinedMap* map = nullptr;  ///< whose newest local map says what has been seen; may be null
   const ScanView* scan = nullptr;
   const std::vector<Point2>* moving = nullptr;  ///< in the map: what moves or has just appeared; may be null
 };
@@ -69,6 +70,8 @@ class PathTracker {
   /// True while the robot is on its straight way past that. Who let the path steer again right after the turn would be led back
   /// to the corner, and turn to and fro before it.
   bool still_passes(const TrackInput& input) const;
+  /// True if the arc to this point of the robot's frame sweeps ground that the local map has not seen.
+  bool sweeps_unseen(const TrackInput& input, const Point2& target) const;
   /// What moves nearby allows.
   double speed_near_moving_mps(const TrackInput& input, const Rollout& ahead) const;
   /// True off the cells the map calls free. A robot that stands in the midst of unknown keeps clearance 0

@@ -50,6 +50,24 @@ bool PathTracker::unknown_ground(const TrackInput& input, double x_m, double y_m
   return input.layer->clearance_m(p.x_m, p.y_m) <= 0.0;
 }
 
+bool PathTracker::sweeps_unseen(const TrackInput& input, const Point2& target) const {
+  if (input.map == nullptr) return false;
+  const double distance = std::hypot(target.x_m, target.y_m), bearing = std::atan2(target.y_m, target.x_m);
+  const double curvature = 2.0 * std::sin(bearing) / std::max(distance, 0.1);
+  double x = 0.0, y = 0.0, yaw = 0.0;
+  for (double s = 0.0; s < distance; s += kStep_m) {
+    x += kStep_m * std::cos(yaw);
+    y += kStep_m * std::sin(yaw);
+    yaw += kStep_m * curvature;
+    for (const double side : {-stop_radius_m_, 0.0, stop_radius_m_}) {
+      const Point2 p{x - side * std::sin(yaw), y + side * std::cos(yaw)};
+      // Round the robot itself nobody has looked, where it was set down.
+      if (std::hypot(p.x_m, p.y_m) > 1.2 * stop_radius_m_ && !input.map->seen(input.T_map_base * p)) return true;
+    }
+  }
+  return false;
+}
+
 PathTracker::Rollout PathTracker::roll_out(const TrackInput& input, double curvature, double length_m,
                                            double near_m, bool backwards) const {
   Rollout out;

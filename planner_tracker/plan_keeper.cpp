@@ -62,6 +62,15 @@ double PlanKeeper::turning_cost_m(const Path& path, const Pose2& robot) const {
   return std::abs(std::atan2(p.y_m, p.x_m)) / config_.max_vel_theta * config_.max_vel_x;
 }
 
+void PlanKeeper::let_walk_on(CombinedMap& map, double now_s) {
+  const auto gone = [&](const LeftTo& left) {
+    if (now_s <= left.until_s) return false;
+    map.forget_round(left.at, kMovesThere_m);
+    return true;
+  };
+  left_to_somebody_.erase(std::remove_if(left_to_somebody_.begin(), left_to_somebody_.end(), gone), left_to_somebody_.end());
+}
+
 bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& moving) {
   const bool first = held_since_s_ < 0.0;
   if (first) {
@@ -73,7 +82,7 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   std::vector<Point2> way;
   held_.rest(&way);
   if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), !strict_, &way)) return false;
-  const double until_s = now_s + config_.planning.closed_memory_s;
+  double until_s = now_s + config_.planning.closed_memory_s;
   if (!seen_shut_.has(at_, kSamePlace_m, now_s)) seen_shut_.add(at_, now_s, until_s);
   const double detour_m = result_.cost_m - held_.remaining_m();
   if (detour_m < config_.planning.hold_detour_m) {
@@ -92,6 +101,10 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   held_for_somebody_ = held_for_somebody_ || std::any_of(moving.begin(), moving.end(), there);
   const double worth_s = held_for_somebody_ ? config_.planning.hold_share * detour_m / config_.max_vel_x : 0.0;
   if (now_s - held_since_s_ > to_see_s_ + std::max(config_.planning.hold_s, worth_s)) {
+    if (held_for_somebody_) {
+      until_s = now_s + config_.planning.somebody_memory_s;
+      left_to_somebody_.push_back({at_, until_s});
+    }
     shut_.add(at_, now_s, until_s);
     return false;
   }
@@ -228,6 +241,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
   switched_ = false;
   strict_ = now_s < strict_until_s_;
   const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
+  let_walk_on(map, now_s);
   const MapLayer& layer = map.combined();
   Outcome kind = Outcome::kToGoal;
   Point2 nearby;

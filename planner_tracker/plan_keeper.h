@@ -40,6 +40,7 @@ class PlanKeeper {
     closed_.clear();
     shut_.clear();
     seen_shut_.clear();
+    left_to_somebody_.clear();
   }
   /// @param moving  points of the map at which something moves, see MovingCells
   Outcome replan(CombinedMap& map, const Pose2& robot, const Point2& goal, double now_s, const std::vector<Point2>& moving = {});
@@ -67,6 +68,8 @@ class PlanKeeper {
   /// What it costs to turn towards a path's beginning: the metres the robot could have driven meanwhile.
   double turning_cost_m(const Path& path, const Pose2& robot) const;
   /// True if the way round is to be left alone for now.
+  /// Forgets who closed a way and has walked on since.
+  void let_walk_on(CombinedMap& map, double now_s);
   bool hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& moving);
   void take(const std::vector<Point2>& path);
   /// A way's direction beyond a point of its segment from way[segment - 1] to way[segment]. There it leads through what is
@@ -100,6 +103,11 @@ class PlanKeeper {
   double strict_until_s_ = -1.0;  ///< see too_narrow()
   bool strict_ = false;
   bool held_for_somebody_ = false;  ///< who moved there
+  struct LeftTo {
+    Point2 at;
+    double until_s;
+  };
+  std::vector<LeftTo> left_to_somebody_;
   ShutWays shut_;       ///< waited for in vain
   ShutWays seen_shut_;  ///< at all
   bool look_elsewhere_ = false, elsewhere_ = false;

@@ -200,6 +200,7 @@ Command PlannerTracker::State::step(double now_s, const RobotState& robot) {
   input.w_radps = previous_w;
   input.dt_s = std::clamp(dt, 0.0, 0.1);
   input.layer = &map.combined();
+  input.map = &map;
   input.scan = &scan;
   input.moving = &moving.points();
   Pose2 then = robot.T_odom_base;

@@ -50,6 +50,7 @@ struct PlanningConfig {
   double look_distance_m = 1.8;
   double back_up_after_s = 1.5;
   double closed_memory_s = 120.0;
+  double somebody_memory_s = 30.0;
   /// Nearer to a closed place than this, the robot looks at it from elsewhere.
   double too_near_m() const { return 0.75 * look_distance_m; }
   double slowness = 5.0;
@@ -78,6 +79,8 @@ struct PlanningConfig {
     v.number("closed_memory_s", closed_memory_s, 0, 3600, "s",
              "What the local map showed occupied stays so for this long once it is off its edge, so that the robot does not "
              "turn to and fro between a way found closed and another.");
+    v.number("somebody_memory_s", somebody_memory_s, 0, 3600, "s",
+             "The same where somebody was seen to move who closed the way: by then he has walked on, and the way back may be the shorter.");
     v.number("slowness", slowness, 1, 100, "",
              "The goal fails after 60 s plus this many times what its first plan takes at full speed.");
     v.number("goal_snap_m", goal_snap_m, 0, 5, "m",
@@ -90,6 +93,7 @@ struct PlanningConfig {
 struct TrackingConfig {
   double lookahead_m = 0.55;
   double turn_first_rad = 0.60;
+  double unseen_turn_first_rad = 0.16;
   double turned_rad = 0.15;
   double slow_mps = 0.15;
   double reaction_s = 0.20;
@@ -105,6 +109,9 @@ struct TrackingConfig {
              "The robot steers at the point of the path this far ahead.");
     v.number("turn_first_rad", turn_first_rad, 0.1, 3.2, "rad",
              "Further off than this, the robot turns in place, so that it sees where it will drive.");
+    v.number("unseen_turn_first_rad", unseen_turn_first_rad, 0.1, 3.2, "rad",
+             "The same where the arc to there sweeps ground that the local map has not seen: behind a corner something may stand "
+             "right beside the way, which a camera that looks along the arc does not show.");
     v.number("turned_rad", turned_rad, 0.02, 1, "rad", "Such a turn ends when this little is left.");
     v.number("slow_mps", slow_mps, 0.02, 1, "m/s", "Speed where only the hard clearance is left.");
     v.number("reaction_s", reaction_s, 0, 1, "s", "From light in the Kinect to brakes on the wheels.");

@@ -84,6 +84,7 @@ struct PlannerTracker::State {
   double missing_since_s = -1.0;
   double blocked_since_s = -1.0;
   Point2 blocked_at;
+  Pose2 T_odom_blocked;  ///< where the robot was then
   double looking_since_s = -1.0;  ///< standing before a closed way
   double near_since_s = -1.0;     ///< ... or anything else in the way, too near to see well
   int avoidances = 0;

@@ -10,6 +10,7 @@ namespace knav {
 namespace {
 
 constexpr double kFailedPlanWait_s = 1.0;  ///< a search that finds nothing is the dearest
+constexpr double kGotOn_m = 0.05, kGotOn_rad = 0.2;
 constexpr double kFloorSeenFrom_m = 1.2;  ///< nearer, a level Kinect at 0.5 m does not see the floor
 
 Point2 position(const Pose2& pose) { return {pose.x_m, pose.y_m}; }
@@ -233,14 +234,20 @@ void PlannerTracker::State::drive(double now_s, const RobotState& robot) {
   }
   const TrackOutput out = tracker.follow(input, path);
   if (out.kind == TrackOutput::Kind::kBlocked) {
-    if (blocked_since_s < 0.0) blocked_since_s = now_s;
+    if (blocked_since_s < 0.0) {
+      blocked_since_s = now_s;
+      T_odom_blocked = robot.T_odom_base;
+    }
     blocked_at = out.obstacle;
     if (now_s - blocked_since_s > 0.5 * config.planning.controller_patience) keeper.too_narrow(now_s);
     if (backing_up(now_s, robot, blocked_at)) return;
     act(Activity::kWaiting, out);
     return;
   }
-  blocked_since_s = near_since_s = -1.0;
+  // Who turns a little, and is blocked again, has not got on.
+  const Pose2 moved = T_odom_blocked.inverse() * robot.T_odom_base;
+  if (std::hypot(moved.x_m, moved.y_m) > kGotOn_m || std::abs(moved.yaw_rad) > kGotOn_rad) blocked_since_s = -1.0;
+  near_since_s = -1.0;
   act(out.kind == TrackOutput::Kind::kTurning ? Activity::kTurning
       : to_goal                               ? Activity::kDriving
                                               : Activity::kApproaching,

@@ -132,6 +132,21 @@ TEST_F(TwoDoors, AWayFoundShutThatHasGoneOffTheLocalMapIsNotTurnedBackForUntilIt
   EXPECT_FALSE(goes_round());
 }
 
+TEST_F(TwoDoors, ForAWayThatSomebodyClosedTheRobotTurnsBackOnceHeHasHadTimeToWalkOn) {
+  look(0.0, 1.0, {{5.9, 3.2}});
+  const double left_s = config_.planning.hold_share * 28.0 / config_.max_vel_x + kToSee_s;
+  look(0.0, left_s);
+  ASSERT_TRUE(goes_round());
+  OccupancyGrid unknown = rooms(1.0);
+  std::fill(unknown.value.begin(), unknown.value.end(), static_cast<std::int8_t>(-1));
+  map_.set_local(unknown, Pose2{});
+  const double until_s = left_s + config_.planning.somebody_memory_s;
+  keeper_.replan(map_, {3.0, 3.0, 0.0}, {10.0, 3.0}, 100.0 + until_s - 1.0);
+  EXPECT_TRUE(goes_round());
+  keeper_.replan(map_, {3.0, 3.0, 0.0}, {10.0, 3.0}, 100.0 + until_s + 1.0);
+  EXPECT_FALSE(goes_round());
+}
+
 TEST_F(TwoDoors, AWayFoundShutTwiceIsNotTurnedBackForThoughItLooksOpen) {
   // What leaves half a metre beside a wall looks open from 6 m and closed from 3 m: in Willow Garage the robot turned to and fro
   // before it until its time was over.

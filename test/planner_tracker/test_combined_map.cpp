@@ -137,6 +137,17 @@ TEST(Overlay, WhatIsOnTheLocalMapAgainIsTheLocalMapsToSay) {
   EXPECT_FALSE(corridor.closed());
 }
 
+TEST(Overlay, WhatIsRememberedRoundAPointCanBeForgotten) {
+  Corridor corridor(60.0);
+  corridor.look_from(9.0, true, 100.0);
+  corridor.look_from(5.0, false, 101.0);
+  ASSERT_TRUE(corridor.closed());
+  corridor.map.forget_round({14.0, 1.0}, 1.0);
+  EXPECT_TRUE(corridor.closed());
+  corridor.map.forget_round({12.5, 1.0}, 1.0);
+  EXPECT_FALSE(corridor.closed());
+}
+
 TEST(Overlay, ClearingForgetsWhatWasRememberedAndWithoutMemoryNothingIs) {
   Corridor corridor(60.0), forgetful(0.0);
   for (Corridor* c : {&corridor, &forgetful}) {

@@ -1,0 +1,48 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "planner_tracker/path_tracker.h"
+#include "toy_world.h"
+
+namespace knav {
+namespace {
+
+TEST(Tracker, WhereTheArcSweepsUnseenGroundTheRobotTurnsToLookFirst) {
+  // A path that bends to the left by less than what makes the robot turn in place anyway. A quarter of a metre left of it nobody has looked.
+  const PlannerTrackerConfig config;
+  const OccupancyGrid free = room(4.0, 4.0);
+  CombinedMap map(0.6, config.clearance.occupied_threshold, config.clearance.free_threshold);
+  map.set_global({}, free, {});
+  RangeScan scan;
+  scan.angle_min_rad = -static_cast<float>(kPi);
+  scan.angle_increment_rad = static_cast<float>(2.0 * kPi / 360);
+  scan.range_max_m = 20.0f;
+  scan.range_m.assign(360, 10.0f);
+  scan.evidence.assign(360, 1.0f);
+  ScanView view(3.0, 1.0);
+  view.set(scan, Pose2{});
+  view.place(Pose2{}, Pose2{});
+  Path path;
+  path.set({{1.0, 2.0}, {2.0, 2.35}});
+  for (const bool seen : {true, false}) {
+    OccupancyGrid local = free;
+    if (!seen) fill(&local, 1.1, 2.25, 1.6, 2.6, -1);
+    map.set_local(local, Pose2{});
+    PathTracker tracker(config);
+    TrackInput input;
+    input.T_map_base = {1.0, 2.0, 0.0};
+    input.layer = &map.combined();
+    input.map = &map;
+    input.scan = &view;
+    const TrackOutput out = tracker.follow(input, path);
+    EXPECT_EQ(out.kind, seen ? TrackOutput::Kind::kDriving : TrackOutput::Kind::kTurning);
+    EXPECT_GT(out.w_radps, 0.0);
+    // Along the path it looks as far to one side as to the other: on it goes.
+    input.T_map_base.yaw_rad = std::atan2(0.35, 1.0);
+    EXPECT_EQ(tracker.follow(input, path).kind, TrackOutput::Kind::kDriving);
+  }
+}
+
+}  // namespace
+}  // namespace knav
