@@ -64,6 +64,9 @@ class PlanKeeper {
   GridPlanner& planner() { return planner_; }
 
  private:
+  static constexpr double kSamePlace_m = 1.0;  ///< what closes a way there is the same thing
+  static constexpr double kElsewhere_m = 0.6;  ///< another place to look from is this far from the last at least
+
   double old_cost_m(const MapLayer& layer, Path* path, const Point2& robot);
   /// What it costs to turn towards a path's beginning: the metres the robot could have driven meanwhile.
   double turning_cost_m(const Path& path, const Pose2& robot) const;
@@ -72,6 +75,8 @@ class PlanKeeper {
   void let_walk_on(CombinedMap& map, double now_s);
   bool hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& moving);
   void take(const std::vector<Point2>& path);
+  /// There is no way now. Would there be one, where is it closed, and where can that be looked at from?
+  Outcome go_and_look(CombinedMap& map, const Point2& robot, const Point2& goal, double now_s);
   /// A way's direction beyond a point of its segment from way[segment - 1] to way[segment]. There it leads through what is
   /// closed; before, it may come along the wall.
   static Point2 direction_beyond(const std::vector<Point2>& way, std::size_t segment, const Point2& p);

@@ -3,10 +3,29 @@
 #include <cmath>
 
 #include "planner_tracker/path_tracker.h"
+#include "planner_tracker/planner_tracker.h"
 #include "toy_world.h"
 
 namespace knav {
 namespace {
+
+TEST(Tracker, ACornerRightBesideTheRobotIsTurnedAwayFromAndPassed) {
+  // In a gap of 0.6 m, its left corner nearer than any arc from this heading could pass, with a hand's breadth to spare on the right: it
+  // waited there, and then tried random moves.
+  OccupancyGrid grid = room(5.0, 2.0);
+  fill(&grid, 2.0, 0.0, 2.5, 2.0, 100);
+  fill(&grid, 2.0, 0.7, 2.5, 1.3, 0);
+  for (const Pose2& start : {Pose2{1.80, 1.09, 0.30}, Pose2{1.88, 1.10, 0.45}, Pose2{1.92, 1.09, 0.15}, Pose2{2.08, 1.09, 0.30}}) {
+    ToyWorld world(grid, grid, start);
+    ASSERT_TRUE(world.planner.set_goal({4.0, 1.0, 0.0}));
+    const double began_s = world.now_s;
+    const Command command = world.run(60.0);
+    ASSERT_EQ(command.activity, Activity::kReached) << world.planner.failure().reason;
+    EXPECT_EQ(world.collisions, 0) << start.x_m;
+    EXPECT_EQ(world.avoidances, 0) << start.x_m;
+    EXPECT_LT(world.now_s - began_s, 12.0) << start.x_m;
+  }
+}
 
 TEST(Tracker, WhereTheArcSweepsUnseenGroundTheRobotTurnsToLookFirst) {
   // A path that bends to the left by less than what makes the robot turn in place anyway. A quarter of a metre left of it nobody has looked.
