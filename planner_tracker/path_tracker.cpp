@@ -11,6 +11,9 @@ constexpr double kNearEnd_m = 0.4;
 constexpr double kPast_m = 0.4;        ///< straight on, to be past what stands right beside the robot
 constexpr double kPastStep_rad = 0.1;
 constexpr double kAlong = 0.3;         ///< of turned_rad, where the turn is for looking along the way
+constexpr double kBody_m = 0.25;        ///< of somebody who walks
+constexpr double kWalkerAhead_s = 2.0, kWalkerStep_s = 0.2;
+constexpr double kHelps_m = 0.05;
 constexpr double kPassed_m = 0.12;     ///< before the end of that
 constexpr double kTurned_rad = 0.03;
 
@@ -96,6 +99,33 @@ double PathTracker::speed_near_moving_mps(const TrackInput& input, const Rollout
   const double share = std::clamp(nearest / t.moving_distance_m, 0.0, 1.0);
   const double slow = std::min(t.moving_mps, config_.max_vel_x);
   return slow + (config_.max_vel_x - slow) * share;
+}
+
+bool PathTracker::meets_a_walker(const TrackInput& input, double curvature, double v_mps, double reach_m) const {
+  const TrackingConfig& t = config_.tracking;
+  if (input.walkers == nullptr || t.walker_gap_m <= 0.0) return false;
+  const Pose2 T_base_map = input.T_map_base.inverse();
+  const double c = std::cos(T_base_map.yaw_rad), s = std::sin(T_base_map.yaw_rad);
+  const double touch_m = outline_.circumscribed_m() + kBody_m, wanted_m = touch_m + t.walker_gap_m;
+  for (const Walker& walker : *input.walkers) {
+    const Point2 p = T_base_map * walker.at, step{c * walker.v_mps.x_m - s * walker.v_mps.y_m, s * walker.v_mps.x_m + c * walker.v_mps.y_m};
+    const double now_m = std::hypot(p.x_m, p.y_m);
+    double standing_m = now_m;  // how near he would come if the robot stood
+    // Whom the camera sees is in the scan.
+    if (in_view(input.T_map_base, walker.at)) continue;
+    for (double ahead_s = kWalkerStep_s; ahead_s <= kWalkerAhead_s; ahead_s += kWalkerStep_s) {
+      const double driven = std::min(v_mps * ahead_s, reach_m), turned = curvature * driven;
+      const double x = std::abs(turned) < 1e-3 ? driven : std::sin(turned) / curvature;
+      const double y = std::abs(turned) < 1e-3 ? 0.0 : (1.0 - std::cos(turned)) / curvature;
+      const Point2 then{p.x_m + step.x_m * ahead_s, p.y_m + step.y_m * ahead_s};
+      standing_m = std::min(standing_m, std::hypot(then.x_m, then.y_m));
+      const double apart_m = std::hypot(then.x_m - x, then.y_m - y);
+      // Standing must help: who walks up to the robot, or has passed it, is no reason to stand.
+      if (standing_m < touch_m) break;
+      if (apart_m < wanted_m && apart_m < now_m && apart_m < standing_m - kHelps_m) return true;
+    }
+  }
+  return false;
 }
 
 double PathTracker::bearing_past(const TrackInput& input, double bearing_rad) const {
@@ -202,11 +232,12 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
   if (std::abs(curvature) > 1e-6) v = std::min(v, config_.max_vel_theta / std::abs(curvature));
   v = std::min(v, std::sqrt(2.0 * 0.7 * config_.acc_lim_x * std::max(0.0, path.remaining_m())) + 0.01);
   const double a = t.stop_decel_mps2, delay = t.reaction_s;
-  bool brake = false;
+  bool brake = meets_a_walker(input, curvature, v, reach);
+  if (brake) v = 0.0;
   if (ahead.free_m < reach - 0.01) {
     const double room = std::max(0.0, ahead.free_m - 0.05);
     const double v_stop = a * (std::sqrt(delay * delay + 2.0 * room / a) - delay);
-    brake = v_stop < v;
+    brake = brake || v_stop < v;
     v = std::min(v, v_stop);
   }
   TrackOutput out;

@@ -7,6 +7,7 @@
 #include "planner_tracker/path.h"
 #include "planner_tracker/planner_tracker_config.h"
 #include "planner_tracker/scan_view.h"
+#include "planner_tracker/walkers.h"
 
 namespace knav {
 
@@ -19,6 +20,7 @@ struct TrackInput {
   const CombinedMap* map = nullptr;  ///< whose newest local map says what has been seen; may be null
   const ScanView* scan = nullptr;
   const std::vector<Point2>* moving = nullptr;  ///< in the map: what moves or has just appeared; may be null
+  const std::vector<Walker>* walkers = nullptr;  ///< in the map: where those who walk are expected now; may be null
 };
 
 struct TrackOutput {
@@ -74,6 +76,8 @@ class PathTracker {
   bool sweeps_unseen(const TrackInput& input, const Point2& target) const;
   /// What moves nearby allows.
   double speed_near_moving_mps(const TrackInput& input, const Rollout& ahead) const;
+  /// True if somebody who walks where the camera does not look will come too near to a robot that drives this arc.
+  bool meets_a_walker(const TrackInput& input, double curvature_radpm, double v_mps, double reach_m) const;
   /// True off the cells the map calls free. A robot that stands in the midst of unknown keeps clearance 0
   /// wherever it goes, so that a rule of not coming nearer would not hold it. Half its radius is let pass (it
   /// stands there), too little to creep on by.

@@ -71,19 +71,23 @@ void PlannerTracker::set_map(const DistanceMap& distance, const OccupancyGrid& o
   state_->map.set_global(distance, occupancy, keepout);
   state_->keeper.set_map(state_->map);
   state_->moving.reset(state_->map.global());
+  state_->walkers.clear();
   state_->next_plan_s = -1.0;
 }
 
 void PlannerTracker::set_local_map(const OccupancyGrid& local, const Pose2& T_map_local) {
   State& s = *state_;
   s.map.set_local(local, T_map_local, s.last_step_s);
-  if (!s.map.empty()) s.moving.update(s.map.global(), s.map.combined(), s.map.local_window(), s.last_step_s);
+  if (s.map.empty()) return;
+  s.moving.update(s.map.global(), s.map.combined(), s.map.local_window(), s.last_step_s);
+  s.walkers.update(s.moving.points(), s.map.combined(), s.input.T_map_base, s.last_step_s);
 }
 
 void PlannerTracker::clear_local_map() {
   if (state_->map.empty()) return;
   state_->map.clear_local();
   state_->moving.reset(state_->map.global());
+  state_->walkers.clear();
 }
 
 void PlannerTracker::set_scan(const RangeScan& scan, const Pose2& T_base_sensor) {
@@ -203,6 +207,8 @@ Command PlannerTracker::State::step(double now_s, const RobotState& robot) {
   input.map = &map;
   input.scan = &scan;
   input.moving = &moving.points();
+  walkers.expected(now_s, config.tracking.walker_memory_s, &expected_walkers);
+  input.walkers = &expected_walkers;
   Pose2 then = robot.T_odom_base;
   odometry.at(scan.stamp_s(), 1.0, 0.2, &then);
   scan.place(then, robot.T_odom_base);

@@ -102,6 +102,8 @@ struct TrackingConfig {
   double stop_decel_mps2 = 1.0;
   double moving_mps = 3.0;
   double moving_distance_m = 0.8;
+  double walker_gap_m = 0.3;
+  double walker_memory_s = 3.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -120,6 +122,10 @@ struct TrackingConfig {
     v.number("stop_decel_mps2", stop_decel_mps2, 0.1, 10, "m/s^2", "Braking when something is in the way.");
     v.number("moving_mps", moving_mps, 0.02, 3, "m/s", "Speed right beside what moves or has just appeared (max_vel_x or more: no slower for it); max_vel_x ...");
     v.number("moving_distance_m", moving_distance_m, 0.05, 5, "m", "... is allowed this far from it.");
+    v.number("walker_gap_m", walker_gap_m, 0, 3, "m",
+             "Who was seen walking, and is out of view now, is expected to walk on as he did: the robot stops where he and it would come "
+             "nearer to each other than this within 2 s. 0 = off.");
+    v.number("walker_memory_s", walker_memory_s, 0, 3, "s", "Expected for so long after he was last seen.");
   }
 };
 

@@ -60,6 +60,8 @@ struct PlannerTracker::State {
   PlannerTrackerConfig config;
   CombinedMap map;
   MovingCells moving;
+  Walkers walkers;
+  std::vector<Walker> expected_walkers;
   PlanKeeper keeper;
   PathTracker tracker;
   RandomMoves moves;
