@@ -23,8 +23,8 @@ constexpr double kStands_mps = 0.02, kStands_radps = 0.05;
 
 class GoalDriver {
  public:
-  GoalDriver(ClosedLoop& loop, const Pose2& T_world_map, FlightRecorder* recorder, const std::function<void()>& poll)
-      : loop_(loop), T_map_world_(T_world_map.inverse()), recorder_(recorder), poll_(poll) {}
+  GoalDriver(ClosedLoop& loop, const WorldInMap& world_in_map, FlightRecorder* recorder, const std::function<void()>& poll)
+      : loop_(loop), world_in_map_(world_in_map), recorder_(recorder), poll_(poll) {}
 
   double driving_s() const { return driving_s_; }
   int plans() const { return plans_; }
@@ -33,7 +33,7 @@ class GoalDriver {
     result_ = {};
     result_.goal = goal;
     label_ = label;
-    const Pose2 T_map_goal = T_map_world_ * goal.T_world_goal;
+    const Pose2 T_map_goal = world_in_map_ * goal.T_world_goal;
     const double start_s = loop_.now_s(), start_m = loop_.simulator().distance_driven_m();
     const double straight_m = distance_m(loop_.simulator().T_world_base(), goal.T_world_goal);
     double limit_s = goal.expected == Expected::kReached ? kGrace_s + 2.0 * straight_m / kSlow_mps : kUnreachable_s;
@@ -108,13 +108,13 @@ class GoalDriver {
     const Failure& failure = loop_.stack().failure();
     result_.failure_code = static_cast<int>(failure.code);
     result_.reason = failure.reason;
-    const Point2 closed = T_map_world_ * result_.goal.closed_at;
+    const Point2 closed = world_in_map_ * result_.goal.closed_at;
     if (result_.goal.expected == Expected::kBlocked)
       result_.reason_off_m = std::hypot(failure.at.x_m - closed.x_m, failure.at.y_m - closed.y_m);
   }
 
   ClosedLoop& loop_;
-  Pose2 T_map_world_;
+  const WorldInMap& world_in_map_;
   FlightRecorder* recorder_;
   std::function<void()> poll_;
   GoalResult result_;
@@ -129,17 +129,17 @@ class GoalDriver {
 }  // namespace
 
 GoalRunRecord drive_goals(const SimulatorConfig& simulator, const NavigationStackConfig& stack, const WorldConfig& changed,
-                          const MapDirectory& map, const Pose2& T_world_map, const SuiteRun& run,
+                          const MapDirectory& map, const WorldInMap& world_in_map, const SuiteRun& run,
                           const BenchmarkProgress& progress, FlightRecorder* recorder) {
   const auto wall_start = std::chrono::steady_clock::now();
   GoalRunRecord record;
   record.result.name = run.name;
   ClosedLoop loop(simulator, stack, changed, map, recorder);
   loop.record(&record.truth, &record.estimate);
-  loop.start(T_world_map.inverse() * changed.spawn);
+  loop.start(world_in_map * changed.spawn);
   const double start_s = loop.now_s();
   std::size_t done = 0;
-  GoalDriver driver(loop, T_world_map, recorder,
+  GoalDriver driver(loop, world_in_map, recorder,
                     [&] { progress("run", static_cast<double>(done) / static_cast<double>(run.goals.size())); });
   for (; done < run.goals.size(); ++done) {
     const SuiteGoal& goal = run.goals[done];
@@ -151,7 +151,7 @@ GoalRunRecord drive_goals(const SimulatorConfig& simulator, const NavigationStac
     const Pose2& at = loop.simulator().T_world_base();
     record.failed_at.push_back({at.x_m, at.y_m});
     if (recorder != nullptr) recorder->failure(label, result.reason);
-    if (goal.expected == Expected::kReached && !loop.place_near(goal.T_world_goal, T_world_map.inverse() * goal.T_world_goal)) {
+    if (goal.expected == Expected::kReached && !loop.place_near(goal.T_world_goal, world_in_map * goal.T_world_goal)) {
       throw UserError(fmt::format("no room for the robot within 2 m of goal {} of {}.", done + 1, run.name));
     }
   }

@@ -49,7 +49,7 @@ struct GoalRunRecord {
 /// Sends the robot to a run's goals in lock-step. One not reached that could be is looked into (recorder), and the robot is set
 /// down there.
 GoalRunRecord drive_goals(const SimulatorConfig& simulator, const NavigationStackConfig& stack, const WorldConfig& changed,
-                          const MapDirectory& map, const Pose2& T_world_map, const SuiteRun& run,
+                          const MapDirectory& map, const WorldInMap& world_in_map, const SuiteRun& run,
                           const BenchmarkProgress& progress, FlightRecorder* recorder = nullptr);
 
 }  // namespace knav

@@ -62,7 +62,6 @@ GoalSession::GoalSession(const GoalSessionOptions& options) : options_(options) 
   setup_.stack = NavigationStackConfig::from_file(options_.config);
   if (!options_.calibration.empty()) setup_.stack.front_end.depth_correction.calibration_file = options_.calibration;
   setup_.map_builder = read_config_section<BuildMapConfig>(options_.config, "map_builder");
-  T_world_map_ = setup_.world.spawn;  // a map's origin is where its drive began
   if (options_.run < 0 || options_.run > options_.suite.runs) {
     throw UserError(fmt::format("--run {}: there are {} runs.", options_.run, options_.suite.runs));
   }
@@ -75,20 +74,22 @@ void GoalSession::map(const SessionProgress& progress) {
   const std::string folder = options_.out + "/map", file = options_.out + "/suite.json";
   if (!is_map_directory(folder) && !options_.map.empty()) {
     MapDirectory made = load_map(options_.map);
-    paint_keepout(setup_.world, T_world_map_, &made);
+    paint_keepout(setup_.world, WorldInMap(setup_.world, made, setup_.world.spawn), &made);
     save_map(folder, made, true);
   } else if (!is_map_directory(folder)) {
     std::vector<Waypoint> none;
     BuiltMap built = map_world(setup_, &none, [&](const std::string& stage, double fraction) {
       progress(stage, fraction, fmt::format("{:.0f} m", setup_.tour.length_m()));
     });
-    paint_keepout(setup_.world, T_world_map_, &built.map);
+    paint_keepout(setup_.world, WorldInMap(setup_.world, built.map, setup_.world.spawn), &built.map);
     save_map(folder, built.map, true);
   }
   map_ = load_map(folder);
+  // A map's origin is where its drive began.
+  world_in_map_ = std::make_unique<WorldInMap>(setup_.world, map_, setup_.world.spawn);
   if (!fs::exists(file)) {
     progress("drawing goals", 0.0, "");
-    const std::vector<SuiteRun> drawn = draw_goals(setup_.world, map_, T_world_map_, options_.suite);
+    const std::vector<SuiteRun> drawn = draw_goals(setup_.world, map_, *world_in_map_, options_.suite);
     write_text_atomically(file, to_json(drawn).dump(1) + "\n");
   }
   suite_ = suite_from_json(read_json(file), file);
@@ -107,12 +108,12 @@ void GoalSession::drive(std::size_t k, const RecorderFactory& recorder, const st
   const WorldConfig world = changed_world(options_.world, protocol, {run.name, run.changes});
   const std::unique_ptr<FlightRecorder> flight = recorder ? recorder(stem(k)) : nullptr;
   GoalRunRecord record = drive_goals(
-      simulator, setup_.stack, world, map_, T_world_map_, run,
+      simulator, setup_.stack, world, map_, *world_in_map_, run,
       [&](const std::string&, double fraction) { progress(fraction); }, flight.get());
   write_trajectory(stem(k) + "_truth.tum", record.truth);
   write_trajectory(stem(k) + "_estimate.tum", record.estimate);
   std::vector<Waypoint> goals;
-  for (const SuiteGoal& goal : run.goals) goals.push_back({goal.kind, T_world_map_.inverse() * goal.T_world_goal, goal.T_world_goal});
+  for (const SuiteGoal& goal : run.goals) goals.push_back({goal.kind, *world_in_map_ * goal.T_world_goal, goal.T_world_goal});
   RunRecord drawn;
   drawn.truth = std::move(record.truth);
   drawn.estimate = std::move(record.estimate);

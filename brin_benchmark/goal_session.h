@@ -45,7 +45,7 @@ class GoalSession {
   GoalSessionOptions options_;
   BenchmarkSetup setup_;
   MapDirectory map_;
-  Pose2 T_world_map_;
+  std::unique_ptr<WorldInMap> world_in_map_;
   std::vector<SuiteRun> suite_;
 };
 

@@ -30,14 +30,14 @@ struct Feature {
 
 class GoalMaker {
  public:
-  GoalMaker(const WorldConfig& world, const MapDirectory& map, const Pose2& T_world_map, const GoalSuiteConfig& config)
-      : world_(world), config_(config), plan_(world, config.robot_radius_m), T_map_world_(T_world_map.inverse()), known_(0.7, 65, 25) {
+  GoalMaker(const WorldConfig& world, const MapDirectory& map, const WorldInMap& world_in_map, const GoalSuiteConfig& config)
+      : world_(world), config_(config), plan_(world, config.robot_radius_m), world_in_map_(world_in_map), known_(0.7, 65, 25) {
     known_.set_global(map.distance, map.occupancy, map.keepout);
     PlannerTrackerConfig robot;
     robot.robot_radius = config.robot_radius_m;
     way_known_ = std::make_unique<GridPlanner>(robot);
     way_known_->set_map(known_.global());
-    start_ = T_map_world_ * Point2{world.spawn.x_m, world.spawn.y_m};
+    start_ = world_in_map_ * Point2{world.spawn.x_m, world.spawn.y_m};
     find_features();
   }
 
@@ -87,7 +87,7 @@ class GoalMaker {
   }
 
   bool known(const Point2& p) const {
-    const Point2 m = T_map_world_ * p;
+    const Point2 m = world_in_map_ * p;
     if (!way_known_->open(known_.global(), m)) return false;
     PlanResult way;
     way_known_->plan(known_.global(), start_, m, &way);
@@ -97,7 +97,7 @@ class GoalMaker {
   std::vector<Point2> known_only(const std::vector<Point2>& points) const {
     std::vector<Point2> out;
     for (const Point2& p : points) {
-      const Point2 m = T_map_world_ * p;
+      const Point2 m = world_in_map_ * p;
       if (known_.global().clearance_m(m.x_m, m.y_m) > config_.robot_radius_m + 0.1) out.push_back(p);
     }
     return out;
@@ -303,7 +303,7 @@ class GoalMaker {
   const WorldConfig& world_;
   const GoalSuiteConfig& config_;
   FloorPlan plan_;
-  Pose2 T_map_world_;
+  const WorldInMap& world_in_map_;
   CombinedMap known_;
   std::unique_ptr<GridPlanner> way_known_;
   Point2 start_;
@@ -316,9 +316,9 @@ class GoalMaker {
 
 }  // namespace
 
-std::vector<SuiteRun> draw_goals(const WorldConfig& world, const MapDirectory& map, const Pose2& T_world_map,
+std::vector<SuiteRun> draw_goals(const WorldConfig& world, const MapDirectory& map, const WorldInMap& world_in_map,
                                  const GoalSuiteConfig& config) {
-  GoalMaker maker(world, map, T_world_map, config);
+  GoalMaker maker(world, map, world_in_map, config);
   std::vector<SuiteRun> suite;
   for (int run = 0; run < config.runs; ++run) suite.push_back(maker.make(run));
   return suite;

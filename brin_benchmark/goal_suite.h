@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "brin_benchmark/layout.h"
+#include "brin_benchmark/world_in_map.h"
 #include "global_map_builder/map_directory.h"
 #include "kinect_sim/world.h"
 #include "planner_tracker/planner_tracker.h"
@@ -51,12 +52,12 @@ struct GoalSuiteConfig {
 
 /// Draws goals and changes for a building. Goals lie where the map knows the floor: where nobody drove while mapping, a robot
 /// is right to refuse. The same world, map and configuration give the same goals. UserError if there is no room.
-/// @param T_world_map  the map's frame in the building
-std::vector<SuiteRun> draw_goals(const WorldConfig& world, const MapDirectory& map, const Pose2& T_world_map,
+std::vector<SuiteRun> draw_goals(const WorldConfig& world, const MapDirectory& map, const WorldInMap& world_in_map,
                                  const GoalSuiteConfig& config);
 
-/// Paints glass and stairs, which the sensor does not see, into the keepout mask, as a person would.
-void paint_keepout(const WorldConfig& world, const Pose2& T_world_map, MapDirectory* map);
+/// Paints glass and stairs, which the sensor does not see, into the keepout mask, as a person would:
+/// beside the walls that are round them in the map.
+void paint_keepout(const WorldConfig& world, const WorldInMap& world_in_map, MapDirectory* map);
 
 nlohmann::json to_json(const std::vector<SuiteRun>& suite);
 std::vector<SuiteRun> suite_from_json(const nlohmann::json& json, const std::string& file);

@@ -49,14 +49,14 @@ bool right_reason(Expected expected, FailureCode code) {
   return false;
 }
 
-void paint_keepout(const WorldConfig& world, const Pose2& T_world_map, MapDirectory* map) {
+void paint_keepout(const WorldConfig& world, const WorldInMap& world_in_map, MapDirectory* map) {
   OccupancyGrid& mask = map->keepout;
   mask.geometry = map->occupancy.geometry;
   const GridGeometry& g = mask.geometry;
   if (mask.value.size() != g.cell_count()) mask.value.assign(g.cell_count(), 0);
   for (int iy = 0; iy < g.height_cells; ++iy) {
     for (int ix = 0; ix < g.width_cells; ++ix) {
-      const Point2 p = T_world_map * Point2{g.center_x_m(ix), g.center_y_m(iy)};
+      const Point2 p = world_in_map.in_world({g.center_x_m(ix), g.center_y_m(iy)});
       const bool glass = std::any_of(world.solids.begin(), world.solids.end(), [&](const Solid& s) {
         return s.material == Material::kGlass && footprint_distance_m(s, p) < kKeepoutRim_m;
       });

@@ -69,8 +69,9 @@ GoalSuiteConfig small_suite() {
 TEST(Goals, ReachableOnesCanBeReachedInTheChangedBuildingAndOthersCannot) {
   const WorldConfig world = parse_world(kHouse, "house.yaml");
   MapDirectory map = true_map(world);
-  paint_keepout(world, world.spawn, &map);
-  const std::vector<SuiteRun> suite = draw_goals(world, map, world.spawn, small_suite());
+  const WorldInMap world_in_map(world, map, world.spawn);
+  paint_keepout(world, world_in_map, &map);
+  const std::vector<SuiteRun> suite = draw_goals(world, map, world_in_map, small_suite());
   ASSERT_EQ(suite.size(), 2u);
   const std::string house = testing::TempDir() + "goals_house.yaml";
   std::ofstream(house) << kHouse;
@@ -102,14 +103,14 @@ TEST(Goals, ReachableOnesCanBeReachedInTheChangedBuildingAndOthersCannot) {
   EXPECT_EQ(kinds["closed room"], 2) << "the house has a door that is the only way";
   for (const char* kind : {"floor", "wall", "keepout"}) EXPECT_GT(kinds[kind], 0) << kind;
   EXPECT_GT(kinds["table edge"] + kinds["low box"] + kinds["stairs"] + kinds["glass"], 4);
-  EXPECT_EQ(to_json(draw_goals(world, map, world.spawn, small_suite())), to_json(suite)) << "the same seed, the same goals";
+  EXPECT_EQ(to_json(draw_goals(world, map, world_in_map, small_suite())), to_json(suite)) << "the same seed, the same goals";
   EXPECT_EQ(to_json(suite_from_json(to_json(suite), "suite.json")), to_json(suite));
 }
 
 TEST(Goals, GlassAndStairsArePaintedIntoTheKeepoutMask) {
   const WorldConfig world = parse_world(kHouse, "house.yaml");
   MapDirectory map = true_map(world);
-  paint_keepout(world, world.spawn, &map);
+  paint_keepout(world, WorldInMap(world, map, world.spawn), &map);
   const auto masked = [&](double x, double y) {
     const Point2 m = world.spawn.inverse() * Point2{x, y};
     const GridGeometry& g = map.keepout.geometry;
@@ -119,6 +120,21 @@ TEST(Goals, GlassAndStairsArePaintedIntoTheKeepoutMask) {
   EXPECT_TRUE(masked(5.8, 5.2));
   EXPECT_FALSE(masked(2.5, 3.0));
   EXPECT_FALSE(masked(4.5, 1.5)) << "a low box is seen";
+}
+
+TEST(Goals, APlaceIsWhereTheWallsRoundItAreInTheMapThoughTheMapIsOffThere) {
+  const WorldConfig world = parse_world(kHouse, "house.yaml");
+  const MapDirectory map = true_map(world);
+  const Pose2 T_world_map = world.spawn * Pose2{0.31, -0.22, 0.03};  // what a bent map's beginning says of this place
+  const WorldInMap world_in_map(world, map, T_world_map);
+  for (const Point2& place : {Point2{2.5, 2.4}, Point2{5.8, 5.2}, Point2{4.5, 1.5}}) {
+    const Point2 found = world_in_map * place, truth = world.spawn.inverse() * place;
+    EXPECT_NEAR(found.x_m, truth.x_m, 0.05) << place.x_m;
+    EXPECT_NEAR(found.y_m, truth.y_m, 0.05) << place.x_m;
+    const Point2 back = world_in_map.in_world(found);
+    EXPECT_NEAR(back.x_m, place.x_m, 0.05);
+    EXPECT_NEAR(back.y_m, place.y_m, 0.05);
+  }
 }
 
 TEST(DirectionWatch, CountsWhoTurnsRoundOrSwaysAndNotWhoTurnsACorner) {
