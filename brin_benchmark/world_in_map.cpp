@@ -13,7 +13,7 @@ constexpr double kAround_m = 6.0, kSquare_m = 3.0;
 constexpr double kSeenFrom_m = 0.6;      ///< lower things may not be in the map
 constexpr double kElsewhere_m = 0.25;    ///< farther from the map's walls than this a point is one that nobody saw
 constexpr double kReach_m = 1.0, kReach_rad = 0.06;
-constexpr double kDearness = 0.002;      ///< of shifting by a metre, per m^2 of misfit: along a corridor nothing says where
+constexpr double kDearness = 0.01;       ///< of shifting by a metre, per m^2 of misfit: along a corridor nothing says where
 constexpr std::size_t kFewest = 40;
 
 }  // namespace
