@@ -24,7 +24,6 @@ PathTracker::PathTracker(const PlannerTrackerConfig& config)
       outline_(config.outline()),
       margin_m_(config.clearance.insist * config.clearance.hard_m),
       stop_radius_m_(outline_.inscribed_m() + margin_m_),
-      kept_m_(std::max(0.0, config.clearance.insist - config.clearance.keep) * config.clearance.hard_m),
       hard_radius_m_(outline_.inscribed_m() + config.clearance.hard_m),
       preferred_radius_m_(outline_.inscribed_m() + config.clearance.preferred_m) {}
 

@@ -88,7 +88,6 @@ class PathTracker {
   Footprint outline_;
   double margin_m_;       ///< nothing may come nearer to the footprint
   double stop_radius_m_;  ///< the same as a clearance_m()
-  double kept_m_;         ///< what the planner keeps open is open to the tracker, unless the scan, which has no cells, says no
   double hard_radius_m_, preferred_radius_m_;
   bool turning_ = false;
   bool passing_ = false;

@@ -232,6 +232,8 @@ void PlannerTracker::State::drive(double now_s, const RobotState& robot) {
       }
     }
   }
+  // On short ways to and fro before something, all that is near is unseen: turning to look at each step would get it nowhere.
+  input.map = to_goal ? &map : nullptr;
   const TrackOutput out = tracker.follow(input, path);
   if (out.kind == TrackOutput::Kind::kBlocked) {
     if (blocked_since_s < 0.0) {
