@@ -204,7 +204,6 @@ Command PlannerTracker::State::step(double now_s, const RobotState& robot) {
   input.w_radps = previous_w;
   input.dt_s = std::clamp(dt, 0.0, 0.1);
   input.layer = &map.combined();
-  input.map = &map;
   input.scan = &scan;
   input.moving = &moving.points();
   walkers.expected(now_s, config.tracking.walker_memory_s, &expected_walkers);

@@ -33,15 +33,7 @@ TEST(Tracker, WhereTheArcSweepsUnseenGroundTheRobotTurnsToLookFirst) {
   const OccupancyGrid free = room(4.0, 4.0);
   CombinedMap map(0.6, config.clearance.occupied_threshold, config.clearance.free_threshold);
   map.set_global({}, free, {});
-  RangeScan scan;
-  scan.angle_min_rad = -static_cast<float>(kPi);
-  scan.angle_increment_rad = static_cast<float>(2.0 * kPi / 360);
-  scan.range_max_m = 20.0f;
-  scan.range_m.assign(360, 10.0f);
-  scan.evidence.assign(360, 1.0f);
-  ScanView view(3.0, 1.0);
-  view.set(scan, Pose2{});
-  view.place(Pose2{}, Pose2{});
+  const ScanView view = open_view();
   Path path;
   path.set({{1.0, 2.0}, {2.0, 2.35}});
   for (const bool seen : {true, false}) {

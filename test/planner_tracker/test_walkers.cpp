@@ -85,21 +85,13 @@ TEST_F(WatchedRoom, FurnitureThatComesIntoViewBitByBitDoesNotWalk) {
 
 class WalkerAtTheSide : public ::testing::Test {
  protected:
-  /// At full speed, at (2, 2) along +x, an open room round it.
+  /// At full speed, at (2, 4) along +x, an open room round it.
   double speed(const Walker& walker) {
     const PlannerTrackerConfig config;
     CombinedMap map(0.7, 65, 25);
     const OccupancyGrid grid = room(8.0, 8.0);
     map.set_global({}, grid, {});
-    RangeScan scan;
-    scan.angle_min_rad = -static_cast<float>(kPi);
-    scan.angle_increment_rad = static_cast<float>(2.0 * kPi / 360);
-    scan.range_max_m = 20.0f;
-    scan.range_m.assign(360, 10.0f);
-    scan.evidence.assign(360, 1.0f);
-    ScanView view(3.0, 1.0);
-    view.set(scan, Pose2{});
-    view.place(Pose2{}, Pose2{});
+    const ScanView view = open_view();
     const std::vector<Walker> walkers{walker};
     TrackInput input;
     input.T_map_base = {2.0, 4.0, 0.0};

@@ -10,6 +10,7 @@
 #include "core/distance_transform.h"
 #include "core/random.h"
 #include "planner_tracker/planner_tracker.h"
+#include "planner_tracker/scan_view.h"
 
 namespace knav {
 
@@ -51,6 +52,20 @@ inline void fill(OccupancyGrid* grid, double x0, double y0, double x1, double y1
       if (g.contains(x, y)) grid->value[g.index(x, y)] = static_cast<std::int8_t>(value);
     }
   }
+}
+
+/// A scan all round that meets nothing nearer than 10 m.
+inline ScanView open_view() {
+  RangeScan scan;
+  scan.angle_min_rad = -static_cast<float>(kPi);
+  scan.angle_increment_rad = static_cast<float>(2.0 * kPi / 360);
+  scan.range_max_m = 20.0f;
+  scan.range_m.assign(360, 10.0f);
+  scan.evidence.assign(360, 1.0f);
+  ScanView view(3.0, 1.0);
+  view.set(scan, Pose2{});
+  view.place(Pose2{}, Pose2{});
+  return view;
 }
 
 struct Disc {
