@@ -103,7 +103,7 @@ TourResult run_tour(Simulator& simulator, const TourScript& script, double odom_
     }
     if (command.stuck) {
       const Pose2& at = simulator.T_world_base();
-      throw UserError(
+      throw NoHeadway(
           fmt::format("{}: the robot makes no headway at [{:.2f}, {:.2f}] in {}; change the script there.",
                       script.file, at.x_m, at.y_m, simulator.world().file));
     }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "core/trajectory.h"
 #include "kinect_sim/simulator.h"
 #include "kinect_sim/tour.h"
@@ -39,13 +40,19 @@ struct TourObserver {
   std::function<bool(const FrameRequest& request)> frame;  ///< a frame was read out; true if it counts as recorded
 };
 
-/// Drives a script through a world in lock-step, with a progress line. UserError if the robot gets stuck.
+/// The robot of a tour is stuck: the script leads it against something, or people stand in its way for good.
+class NoHeadway : public UserError {
+ public:
+  using UserError::UserError;
+};
+
+/// Drives a script through a world in lock-step, with a progress line. NoHeadway if the robot gets stuck.
 /// @param limit_s  stops after so many simulated seconds
 TourResult run_tour(Simulator& simulator, const TourScript& script, double odom_rate_hz, double limit_s,
                     const TourObserver& observer);
 
 /// Drives a script through a world in lock-step, with a progress line, and writes what happens to a bag
-/// (null: to none). UserError if the robot gets stuck.
+/// (null: to none). NoHeadway if the robot gets stuck.
 TourResult run_tour(Simulator& simulator, const TourScript& script, const RecordingOptions& options,
                     rosbag::Bag* bag);
 

@@ -22,6 +22,8 @@ constexpr double kRobotRadius_m = 0.20;
 constexpr int kPeople = 10;
 /// The driver of a tour does not dodge: people walk where they can.
 constexpr double kRoomToPass_m = 1.2;
+/// Nor do people: who stands before the robot turns back after a while, or both would stand there for good.
+constexpr double kGivesWay_s = 8.0;
 constexpr int kPlaces = 14;
 constexpr double kMovedShare = 0.3;
 constexpr int kCalmRun = 3;  // of lay_out's runs this and every sixth from it have no crowd
@@ -138,6 +140,7 @@ YAML::Node changes_of(const WorldConfig& world, int seed, std::string* words) {
       YAML::Node person = people[i];
       if (in_the_way(person)) continue;
       person["name"] = fmt::format("person {}", changes["people"].size() + 1);
+      person["gives_way_s"] = kGivesWay_s;
       changes["people"].push_back(person);
     }
   }

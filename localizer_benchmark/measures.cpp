@@ -25,6 +25,7 @@ Moment ask(Localizer& localizer, const ScanRecording& drive, std::size_t i, cons
   moment.verdict = r.verdict;
   moment.support = r.support;
   moment.fresh_support = r.fresh_support;
+  moment.T_world_base = frame.T_world_base;
   const Pose2 T_world_base = map.T_world_map * r.T_map_base;
   moment.error_m = distance_m(T_world_base, frame.T_world_base);
   moment.error_rad = std::fabs(normalize_angle_rad(T_world_base.yaw_rad - frame.T_world_base.yaw_rad));

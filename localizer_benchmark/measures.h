@@ -18,10 +18,11 @@ struct Moment {
   LocalizationVerdict verdict = LocalizationVerdict::kInitializing;
   double error_m = 0.0, error_rad = 0.0;
   double support = 0.0, fresh_support = 0.0;
+  Pose2 T_world_base;  ///< the truth
   bool ok() const { return verdict == LocalizationVerdict::kOk; }
 };
 
-/// Right: as issue and documentation ask.
+/// Right: near enough to go on from.
 constexpr double kRight_m = 0.3, kRight_deg = 5.0;
 /// Wrong enough to hurt.
 constexpr double kWrong_m = 0.5;

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/file_io.h"
 #include "global_map_builder/map_directory.h"
+#include "kinect_sim/tour_recorder.h"
 #include "localizer_benchmark/truth_map.h"
 
 namespace fs = std::filesystem;
@@ -59,8 +60,11 @@ nlohmann::json recovery_json(const RecoveryScore& s) {
 }
 
 void write_trace(const std::string& path, const std::vector<Moment>& moments) {
-  std::string text = "stamp_s\tverdict\terror_m\terror_deg\tsupport\tfresh_support\n";
-  for (const Moment& m : moments) text += fmt::format("{:.3f}\t{}\t{:.3f}\t{:.2f}\t{:.3f}\t{:.3f}\n", m.stamp_s, verdict_name(m.verdict), m.error_m, m.error_rad * 180.0 / kPi, m.support, m.fresh_support);
+  std::string text = "stamp_s\tverdict\terror_m\terror_deg\tsupport\tfresh_support\ttrue_x_m\ttrue_y_m\ttrue_yaw_rad\n";
+  for (const Moment& m : moments) {
+    text += fmt::format("{:.3f}\t{}\t{:.3f}\t{:.2f}\t{:.3f}\t{:.3f}\t{:.3f}\t{:.3f}\t{:.4f}\n", m.stamp_s, verdict_name(m.verdict), m.error_m,
+                        m.error_rad * 180.0 / kPi, m.support, m.fresh_support, m.T_world_base.x_m, m.T_world_base.y_m, m.T_world_base.yaw_rad);
+  }
   write_text_atomically(path, text);
 }
 
@@ -119,13 +123,29 @@ SimulatedDrive LocalizerRows::drive_of(std::size_t building, bool changed, const
   return drive;
 }
 
+/// Among people and moved furniture a drive laid out beforehand may end before somebody; another seed's is taken then.
+std::optional<ProfileRecording> LocalizerRows::drive_unless_stuck(const SimulatedDrive& drive) {
+  const std::string stuck_file = recordings_.path_of(drive) + ".stuck";
+  if (!options_.fresh && fs::exists(stuck_file)) return std::nullopt;
+  try {
+    return recordings_.get(drive);
+  } catch (const NoHeadway& stuck) {
+    fmt::print(stderr, "{} Another drive takes its place.\n", stuck.what());
+    write_text_atomically(stuck_file, std::string(stuck.what()) + "\n");
+    return std::nullopt;
+  }
+}
+
 LocalizerRows::Drives LocalizerRows::drives(std::size_t building, bool changed, const std::string& sensor, double metres, bool laid_out) {
   Drives drives;
   const int count = options_.quick ? 1 : std::max(1, static_cast<int>(std::ceil(metres / kDrive_m - 0.2)));  // laid-out drives are a little longer
-  for (int k = 0; k < count; ++k) {
+  for (int k = 0; static_cast<int>(drives.profiles.size()) < count; ++k) {
     const SimulatedDrive drive = drive_of(building, changed, sensor, k, laid_out);
-    drives.profiles.push_back(recordings_.get(drive));
-    drives.identity += recordings_.path_of(drive) + "\n";
+    if (std::optional<ProfileRecording> profiles = drive_unless_stuck(drive)) {
+      drives.profiles.push_back(std::move(*profiles));
+      drives.identity += recordings_.path_of(drive) + "\n";
+    }
+    if (k > 2 * count + 2) throw UserError(drive.world_file + ": the robot gets stuck on most drives laid out through it.");
   }
   return drives;
 }

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,7 @@ class LocalizerRows {
     std::string identity;
   };
   SimulatedDrive drive_of(std::size_t building, bool changed, const std::string& sensor, int k, bool laid_out) const;
+  std::optional<ProfileRecording> drive_unless_stuck(const SimulatedDrive& drive);
   Drives drives(std::size_t building, bool changed, const std::string& sensor, double metres, bool laid_out);
   ScanRecording scans(const Drives& drives, const std::vector<Stretch>& stretches, Link link, const std::string& stem);
   const DistanceMap& truth(std::size_t building);

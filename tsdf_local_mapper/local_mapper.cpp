@@ -268,7 +268,7 @@ void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, 
   if (!enough || result.outcome == FrameOutcome::kStarted) return;
   view_check.update(grid, observation, result.T_local_base * T_base_sensor, dt_s);
   if (view_check.carried()) {
-    new_epoch(EpochReason::kCarried, "the robot was carried: it looks through the walls that it knew");
+    new_epoch(EpochReason::kCarried, "the robot was carried: it sees nothing that it knew");
     filter.start_at(result.T_local_base, result.stamp_s);
     have_map = true;
     result.outcome = FrameOutcome::kStarted;

@@ -70,6 +70,8 @@ struct ContinuityConfig {
   double carried_after_s = 1.0;
   double carried_see_through_fraction = 0.5;
   double carried_agree_fraction = 0.25;
+  double carried_view_fraction = 0.6;
+  double carried_near_m = 2.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -82,12 +84,14 @@ struct ContinuityConfig {
     v.number("clock_jump_s", clock_jump_s, 0, 60, "s",
              "A frame older than the newest by more: the clock jumped.");
     v.number("carried_after_s", carried_after_s, 0.1, 60, "s",
-             "Looking through known walls for this long means that the robot was carried: a new epoch.");
+             "A view that cannot be that of the map for this long means that the robot was carried: a new epoch.");
     v.number("carried_see_through_fraction", carried_see_through_fraction, 0.05, 1, "",
-             "Share of the readings on known rays that lie behind the map's surface, to count as that ...");
-    v.number(
-        "carried_agree_fraction", carried_agree_fraction, 0, 1, "",
-        "... unless this share of them meets the map: somebody who stood close before the camera has left.");
+             "It cannot be if this share of the readings on known rays lies behind the map's surface, ...");
+    v.number("carried_view_fraction", carried_view_fraction, 0.05, 1, "",
+             "... or if on this share of the whole view the readings lie behind that surface, or before it and beyond carried_near_m, ...");
+    v.number("carried_near_m", carried_near_m, 0, 20, "m", "... as one or two people who fill the view would be nearer; ...");
+    v.number("carried_agree_fraction", carried_agree_fraction, 0, 1, "",
+             "... unless this share of the readings on known rays meets the map: people come and go, but what is beside them stays.");
   }
 };
 

@@ -5,8 +5,9 @@
 
 namespace knav {
 
-/// Compares a frame with what the map shows from the estimated pose. People and moved things stand in front
-/// of the map's surfaces; only a robot that is elsewhere than it believes looks through most of them. When somebody who
+/// Compares a frame with what the map shows from the estimated pose. People and moved things stand in front of the map's surfaces,
+/// but what is seen beside them still meets the map, unless they fill the view from right before the camera. Only a robot that is
+/// elsewhere than it believes looks through most of the surfaces, or sees others before nearly all of them. When somebody who
 /// stood close before the camera leaves, it looks through him, but what it sees beside him still meets the map.
 class ViewCheck {
  public:

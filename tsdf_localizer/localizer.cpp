@@ -46,6 +46,7 @@ struct Localizer::State {
   void decide();
   void break_with_the_past();
   double evidence_min(double stamp_s) const;
+  double evidence_power() const;
   Pose2 pose_now() { return belief.estimate().pose.mean * T_filter_now; }
 
   LocalizerConfig config;
@@ -147,7 +148,7 @@ const LocalizerResult& Localizer::update(const RangeScan& scan, const Pose2& T_b
     s.refuse("the scan is older than the one before it");
     return s.result;
   }
-  if (!select_rays(scan, T_base_sensor, s.config, s.scans, s.evidence_min(scan.stamp_s), &s.rays)) {
+  if (!select_rays(scan, T_base_sensor, s.config, s.scans, s.evidence_min(scan.stamp_s), s.evidence_power(), &s.rays)) {
     s.refuse("the scan has no rays, or its angles are not finite");
     return s.result;
   }
@@ -228,6 +229,12 @@ void Localizer::State::break_with_the_past() {
 
 double Localizer::State::evidence_min(double stamp_s) const {
   return break_s ? std::exp(-std::max(0.0, stamp_s - *break_s) / config.measurement.evidence_decay_s) : 0.0;
+}
+
+/// What was seen a while ago has had its say when it was seen, and has moved with the local map since. While the pose is in
+/// doubt, it tells places apart all the same.
+double Localizer::State::evidence_power() const {
+  return search.in_doubt() ? config.measurement.evidence_power : config.measurement.evidence_power_tracked;
 }
 
 void Localizer::State::filter(double stamp_s) {

@@ -14,6 +14,7 @@ struct MeasurementConfig {
   double temperature = 0.006;
   double evidence_min = 0.02;
   double evidence_power = 1.0;
+  double evidence_power_tracked = 8.0;
   double evidence_decay_s = 30.0;
   double noise_m = 0.05;
   double noise_per_range_squared = 0.002;
@@ -32,7 +33,9 @@ struct MeasurementConfig {
     v.number("evidence_min", evidence_min, 0, 1, "",
              "Rays with less evidence (intensities of scan_360) are left out.");
     v.number("evidence_power", evidence_power, 0, 10, "",
-             "A ray weighs its evidence to this power: what is old has moved with the local map's drift.");
+             "A ray weighs its evidence to this power while the pose is in doubt, ...");
+    v.number("evidence_power_tracked", evidence_power_tracked, 0, 20, "",
+             "... and to this one while it is not: what is old has had its say, and has moved with the local map's drift.");
     v.number("evidence_decay_s", evidence_decay_s, 0.1, 10000, "s",
              "After how long without a view the scan's evidence has fallen to 1/e (local_mapper's contour/evidence_decay_s).");
     v.number("noise_m", noise_m, 0.005, 1, "m",
@@ -107,6 +110,8 @@ struct GlobalSearchConfig {
   int lookups_per_update = 3000000;
   double ambiguity_margin = 0.03;
   int unseat_after = 10;
+  int unseat_alone_after = 3;
+  double unseat_alone_support = 0.75;
   double repeat_after_m = 0.5;
   double repeat_after_rad = 0.5;
   double repeat_after_s = 1.0;
@@ -129,7 +134,12 @@ struct GlobalSearchConfig {
              "Another place whose price is within this of the best one's makes the place ambiguous.");
     v.integer("unseat_after", unseat_after, 1, 100, "",
               "A pose that was tracked is given up for another only if that many searches, from places repeat_after_m or "
-              "repeat_after_rad apart, found the same other place clearly better.");
+              "repeat_after_rad apart, found the same other place clearly better, ...");
+    v.integer("unseat_alone_after", unseat_alone_after, 1, 100, "",
+              "... or if that many of them found no other place that is about as good, ...");
+    v.number("unseat_alone_support", unseat_alone_support, 0, 1, "",
+             "... and that this place explains at least this share of the scan (people and moved furniture let others look better, "
+             "but seldom well, and seldom one alone).");
     v.number("repeat_after_m", repeat_after_m, 0.05, 50, "m",
              "In doubt, search again after driving this far, ...");
     v.number("repeat_after_rad", repeat_after_rad, 0.05, 50, "rad", "... or turning this far, ...");

@@ -58,19 +58,19 @@ bool PoseSearch::update(double stamp_s, const MapFields& fields, const ScanRays&
 
 /// A place that only happens to look right does not look right from the next place as well. Seen from one and the same place,
 /// it always does.
-bool PoseSearch::unseats_tracked(const Pose2& T_rival_filter, const Pose2& T_filter_now) {
+bool PoseSearch::unseats_tracked(const Pose2& T_rival_filter, const Pose2& T_filter_now, bool alone) {
   const GlobalSearchConfig& c = config_.global_search;
   const Pose2 T_rival = T_rival_filter * T_filter_now;
   if (same_rival_ == 0 || !same_place(T_rival, T_rival_)) {
-    same_rival_ = 1;
+    same_rival_ = same_alone_ = 0;
   } else if (rival_m_ < c.repeat_after_m && rival_rad_ < c.repeat_after_rad) {
     return false;
-  } else {
-    ++same_rival_;
   }
+  ++same_rival_;
+  same_alone_ += alone;
   T_rival_ = T_rival;
   rival_m_ = rival_rad_ = 0.0;
-  return same_rival_ >= c.unseat_after;
+  return same_rival_ >= c.unseat_after || same_alone_ >= c.unseat_alone_after;
 }
 
 bool PoseSearch::judge(const MapFields& fields, const Pose2& T_filter_now, Belief* belief) {
@@ -138,7 +138,8 @@ bool PoseSearch::judge(const MapFields& fields, const Pose2& T_filter_now, Belie
       same_rival_ = 0;
       return false;
     }
-    if (!unseats_tracked(rival->T_map_base * T_start_now_ * T_filter_now.inverse(), T_filter_now)) return false;
+    const bool alone = as_good <= 1 && rival->support >= config_.global_search.unseat_alone_support;
+    if (!unseats_tracked(rival->T_map_base * T_start_now_ * T_filter_now.inverse(), T_filter_now, alone)) return false;
   }
   defeats_ = clearly ? defeats_ + 1 : 0;
   const double fraction = !clearly ? 0.3 : defeats_ >= 2 ? 0.95 : 0.5;

@@ -47,7 +47,7 @@ class PoseSearch {
 
  private:
   bool due(double stamp_s) const;
-  bool unseats_tracked(const Pose2& T_rival_filter, const Pose2& T_filter_now);
+  bool unseats_tracked(const Pose2& T_rival_filter, const Pose2& T_filter_now, bool alone);
   bool judge(const MapFields& fields, const Pose2& T_filter_now, Belief* belief);
 
   LocalizerConfig config_;
@@ -62,6 +62,7 @@ class PoseSearch {
   int defeats_ = 0;              ///< searches in a row that found a better one
   Pose2 T_rival_;                ///< where the better one of the last search is now
   int same_rival_ = 0;           ///< searches in a row, from places apart, that found that one
+  int same_alone_ = 0;           ///< those of them that found no other place that is about as good, and this one to explain the scan
   double rival_m_ = 0.0, rival_rad_ = 0.0;  ///< driven and turned since one of them was counted
   std::vector<Hypothesis> now_;  ///< hypotheses at the time of the filter
 };

@@ -13,7 +13,7 @@ void ScanRays::clear() {
 }
 
 bool select_rays(const RangeScan& scan, const Pose2& T_base_sensor, const LocalizerConfig& config,
-                 std::size_t phase, double evidence_min, ScanRays* rays) {
+                 std::size_t phase, double evidence_min, double evidence_power, ScanRays* rays) {
   rays->clear();
   rays->T_base_sensor = T_base_sensor;
   const std::size_t count = scan.range_m.size();
@@ -41,7 +41,7 @@ bool select_rays(const RangeScan& scan, const Pose2& T_base_sensor, const Locali
     const double noise_m =
         config.measurement.noise_m + config.measurement.noise_per_range_squared * range * range;
     rays->points.add(static_cast<float>(p.x_m), static_cast<float>(p.y_m),
-                     static_cast<float>(std::pow(evidence, config.measurement.evidence_power) * config.measurement.noise_m / noise_m));
+                     static_cast<float>(std::pow(evidence, evidence_power) * config.measurement.noise_m / noise_m));
     rays->range_m.push_back(static_cast<float>(range));
     rays->evidence.push_back(static_cast<float>(evidence));
   }

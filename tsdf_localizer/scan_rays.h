@@ -26,9 +26,10 @@ struct ScanRays {
 ///
 /// A ray's weight is its evidence, times noise_m over its noise: a reading at 10 m may be 0.2 m wrong and
 /// must not weigh as much as ten near ones.
-/// @param evidence_min rays with less are left out, beside those that the configuration leaves out
+/// @param evidence_min   rays with less are left out, beside those that the configuration leaves out
+/// @param evidence_power a ray weighs its evidence to this power
 bool select_rays(const RangeScan& scan, const Pose2& T_base_sensor, const LocalizerConfig& config,
-                 std::size_t phase, double evidence_min, ScanRays* rays);
+                 std::size_t phase, double evidence_min, double evidence_power, ScanRays* rays);
 
 /// Every n-th of them, so that at most `count` remain.
 void thin_out(const ScanRays& rays, std::size_t count, ScanRays* fewer);

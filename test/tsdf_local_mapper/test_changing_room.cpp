@@ -1,6 +1,7 @@
 // A room in which things leave and people walk, a robot that is carried off, and how the mapper tells them apart.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -98,6 +99,38 @@ TEST_F(LocalMapperTest, BeingCarriedIsNoticed) {
   const std::uint32_t settled = mapper_->result().epoch;
   drive(60, 0.02, 0.01);
   EXPECT_EQ(mapper_->result().epoch, settled);
+}
+
+TEST_F(LocalMapperTest, BeingCarriedIntoASmallerRoomIsNoticed) {
+  // Its walls stand before those that were known, as people would.
+  start();
+  tour();
+  drive(30, 0.0, 0.0);
+  robot_.T_world_base = {0.0, 0.0, 0.0};
+  world_ = RoomWorld();
+  world_.box(-2.0, -1.5, 2.2, 1.5);
+  drive(60, 0.0, 0.0);
+  EXPECT_EQ(mapper_->result().epoch, 1u);
+  EXPECT_EQ(mapper_->result().epoch_reason, EpochReason::kCarried);
+}
+
+TEST_F(LocalMapperTest, TwoPeopleWhoFillTheViewAreNotBeingCarried) {
+  start();
+  drive(90, 0.0, 0.0);
+  put_somebody(robot_.T_world_base * kT_base_camera, 1.0, 0.26);
+  put_somebody(robot_.T_world_base * kT_base_camera, 1.0, -0.26);
+  double agree = 1.0;
+  for (int i = 0; i < 90; ++i) agree = std::min(agree, drive(1, 0.0, 0.0).agree_fraction);
+  EXPECT_LT(agree, config_.continuity.carried_agree_fraction);  // at first nothing that was known is seen
+  EXPECT_EQ(mapper_->result().epoch, 0u);
+}
+
+TEST_F(LocalMapperTest, ThreePeopleAbreastFurtherOffAreNotBeingCarried) {
+  start();
+  drive(90, 0.0, 0.0);
+  for (const double aside_m : {-0.55, 0.0, 0.55}) put_somebody(robot_.T_world_base * kT_base_camera, 1.9, aside_m);
+  drive(90, 0.0, 0.0);
+  EXPECT_EQ(mapper_->result().epoch, 0u);
 }
 
 TEST_F(LocalMapperTest, ACrowdBeforeTheCameraIsNotBeingCarried) {

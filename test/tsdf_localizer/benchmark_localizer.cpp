@@ -24,7 +24,7 @@ void mean_prices_of(benchmark::State& state, PriceCode code) {
   config.laser_max_beams = static_cast<int>(state.range(1));
   config.max_particles = static_cast<int>(state.range(0));
   ScanRays rays;
-  select_rays(make_scan(office, kPose, test::ScanModel(), 0.0), Pose2(), config, 0, 0.0, &rays);
+  select_rays(make_scan(office, kPose, test::ScanModel(), 0.0), Pose2(), config, 0, 0.0, config.measurement.evidence_power, &rays);
   Belief belief(config);
   belief.spread_around(kPose, Eigen::Vector3d(0.01, 0.01, 0.003).asDiagonal());
   std::vector<float> cost;
@@ -83,7 +83,7 @@ void BM_CheckPose(benchmark::State& state) {
   const LocalizerConfig config;
   const DistanceMap map = office.distance_map();
   ScanRays rays;
-  select_rays(make_scan(office, kPose, test::ScanModel(), 0.0), Pose2(), config, 0, 0.0, &rays);
+  select_rays(make_scan(office, kPose, test::ScanModel(), 0.0), Pose2(), config, 0, 0.0, config.measurement.evidence_power, &rays);
   for (auto _ : state)
     benchmark::DoNotOptimize(check_pose(map, rays, kPose, config.measurement, config.health));
 }
@@ -107,7 +107,7 @@ void BM_SearchStep(benchmark::State& state) {
   const LocalizerConfig config;
   const MapFields fields = make_map_fields(office.distance_map(), config.measurement, config.global_search);
   ScanRays rays;
-  select_rays(make_scan(office, kPose, test::ScanModel(), 0.0), Pose2(), config, 0, 0.0, &rays);
+  select_rays(make_scan(office, kPose, test::ScanModel(), 0.0), Pose2(), config, 0, 0.0, config.measurement.evidence_power, &rays);
   GlobalSearch search(config.global_search, config.measurement, config.health);
   for (auto _ : state) {
     if (!search.running()) search.start(fields, rays, {});

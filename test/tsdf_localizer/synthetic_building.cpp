@@ -155,6 +155,37 @@ RangeScan make_scan(const Building& building, const Pose2& T_map_base, const Sca
   return scan;
 }
 
+RangeScan RememberedView::scan(const Pose2& T_map_base, const Pose2& T_odom_base, double stamp_s) {
+  seen_.push_back({T_map_base, T_odom_base, stamp_s});
+  RangeScan scan = make_scan(building_, T_map_base, model_, stamp_s);
+  ScanModel exact = model_;
+  exact.noise_m = exact.noise_per_range_squared = 0.0;
+  const RangeScan now = make_scan(building_, T_map_base, exact, stamp_s);  // the same patches are unknown
+  for (std::size_t i = 0; i < now.range_m.size(); ++i) {
+    const double angle = now.angle_min_rad + now.angle_increment_rad * static_cast<double>(i);
+    if (std::fabs(angle) <= model_.fresh_fov_rad / 2.0) continue;
+    scan.range_m[i] = NAN;
+    scan.evidence[i] = 0.0f;
+  }
+  for (std::size_t i = 0; i < now.range_m.size(); ++i) {
+    const double angle = now.angle_min_rad + now.angle_increment_rad * static_cast<double>(i), range_m = now.range_m[i];
+    if (std::fabs(angle) <= model_.fresh_fov_rad / 2.0 || !std::isfinite(range_m)) continue;
+    const Point2 point = T_map_base * Point2{range_m * std::cos(angle), range_m * std::sin(angle)};
+    for (auto seen = seen_.rbegin(); seen != seen_.rend(); ++seen) {
+      const Point2 there = seen->T_map_base.inverse() * point;
+      if (std::fabs(std::atan2(there.y_m, there.x_m)) > model_.fresh_fov_rad / 2.0 || std::hypot(there.x_m, there.y_m) > model_.range_max_m) continue;
+      const Point2 here = T_odom_base.inverse() * (seen->T_odom_base * there);
+      const double bearing = std::atan2(here.y_m, here.x_m);
+      if (std::fabs(bearing) <= model_.fresh_fov_rad / 2.0) break;
+      const auto k = static_cast<std::size_t>(std::lround((bearing - scan.angle_min_rad) / scan.angle_increment_rad)) % scan.range_m.size();
+      scan.range_m[k] = static_cast<float>(std::hypot(here.x_m, here.y_m));
+      scan.evidence[k] = static_cast<float>(std::exp((seen->stamp_s - stamp_s) / model_.evidence_decay_s));
+      break;
+    }
+  }
+  return scan;
+}
+
 std::vector<Pose2> drive(const std::vector<Point2>& points, double rate_hz) {
   std::vector<Pose2> poses;
   double yaw = std::atan2(points[1].y_m - points[0].y_m, points[1].x_m - points[0].x_m);

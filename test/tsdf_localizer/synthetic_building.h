@@ -39,10 +39,29 @@ struct ScanModel {
   double noise_per_range_squared = 0.0;
   double fresh_fov_rad = 2.0 * kPi;  ///< ahead of the robot with evidence 1, the rest with old_evidence
   double old_evidence = 0.3;
+  double evidence_decay_s = 30.0;  ///< RememberedView's, instead of old_evidence
   double unknown_fraction = 0.0;  ///< of the old part, in patches of 20 rays
 };
 RangeScan make_scan(const Building& building, const Pose2& T_map_base, const ScanModel& model, double stamp_s,
                     std::uint64_t seed = 1);
+
+/// What scan_360 shows along a drive: outside of the view, what was seen before, where the motion since then puts it. As in the
+/// local map, it has moved with the motion's errors, and its evidence has fallen with its age. (That something may hide it is left
+/// out.)
+class RememberedView {
+ public:
+  RememberedView(const Building& building, const ScanModel& model) : building_(building), model_(model) {}
+  RangeScan scan(const Pose2& T_map_base, const Pose2& T_odom_base, double stamp_s);
+
+ private:
+  struct Seen {
+    Pose2 T_map_base, T_odom_base;
+    double stamp_s;
+  };
+  const Building& building_;
+  ScanModel model_;
+  std::vector<Seen> seen_;
+};
 
 /// Drives straight from point to point at 0.5 m/s and turns on the spot at 1 rad/s; one pose every 1/rate_hz.
 std::vector<Pose2> drive(const std::vector<Point2>& points, double rate_hz);
