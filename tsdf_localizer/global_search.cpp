@@ -40,7 +40,6 @@ GlobalSearch::GlobalSearch(const GlobalSearchConfig& search, const MeasurementCo
 void GlobalSearch::start(const MapFields& fields, const ScanRays& rays, const std::vector<Pose2>& seeds) {
   thin_out(rays, static_cast<std::size_t>(config_.coarse_rays), &coarse_rays_);
   thin_out(rays, kFineRays, &fine_rays_);
-  seeds_ = seeds;
   headings_ = static_cast<std::size_t>(std::ceil(2.0 * kPi / config_.step_rad));
   pose_count_ = fields.search_positions.size() * headings_;
   next_pose_ = 0;
@@ -51,6 +50,12 @@ void GlobalSearch::start(const MapFields& fields, const ScanRays& rays, const st
                       Best());
   candidates_.clear();
   hypotheses_.clear();
+  seeds_.clear();
+  for (const Pose2& seed : seeds) {
+    if (!is_finite(seed)) continue;
+    seeds_.push_back({seed, 1.0, 0.0});
+    check(fields, &seeds_.back());
+  }
   stage_ = Stage::kCoarse;
 }
 
@@ -116,10 +121,16 @@ void GlobalSearch::choose_candidates(const MapFields& fields) {
   if (candidates_.size() > static_cast<std::size_t>(config_.candidates)) {
     candidates_.resize(static_cast<std::size_t>(config_.candidates));
   }
-  for (const Pose2& seed : seeds_) {
-    if (is_finite(seed) && fields.map.nearest(seed.x_m, seed.y_m) > 0.0f)
-      candidates_.push_back({seed, 1.0, 0.0});
+  for (const Hypothesis& seed : seeds_) {
+    if (fields.map.nearest(seed.T_map_base.x_m, seed.T_map_base.y_m) > 0.0f) candidates_.push_back(seed);
   }
+}
+
+void GlobalSearch::check(const MapFields& fields, Hypothesis* hypothesis) const {
+  const Pose2& T = hypothesis->T_map_base;
+  const PoseCheck check = check_pose(fields.map, fine_rays_, T, measurement_, health_);
+  hypothesis->cost = fields.map.nearest(T.x_m, T.y_m) > 0.0f ? check.cost : 1.0;  // inside a wall: no place
+  hypothesis->support = check.support;
 }
 
 std::size_t GlobalSearch::refine(const MapFields& fields, Hypothesis* hypothesis) {
@@ -146,11 +157,8 @@ std::size_t GlobalSearch::refine(const MapFields& fields, Hypothesis* hypothesis
     }
   }
   best.yaw_rad = normalize_angle_rad(best.yaw_rad);
-  const PoseCheck check = check_pose(fields.map, fine_rays_, best, measurement_, health_);
   hypothesis->T_map_base = best;
-  hypothesis->cost =
-      fields.map.nearest(best.x_m, best.y_m) > 0.0f ? check.cost : 1.0;  // inside a wall: no place
-  hypothesis->support = check.support;
+  check(fields, hypothesis);
   return lookups + 10 * fine_rays_.size();
 }
 

@@ -35,6 +35,8 @@ class GlobalSearch {
   double progress() const;
   /// Distinct places, best first. Valid after step() returned true, until start().
   const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
+  /// The seeds as they were given, in their order, however many places are better. Valid as hypotheses().
+  const std::vector<Hypothesis>& seeds() const { return seeds_; }
 
  private:
   enum class Stage { kIdle, kCoarse, kRefine };
@@ -44,6 +46,7 @@ class GlobalSearch {
   };
   std::size_t try_places(const MapFields& fields);
   void choose_candidates(const MapFields& fields);
+  void check(const MapFields& fields, Hypothesis* hypothesis) const;
   std::size_t refine(const MapFields& fields, Hypothesis* hypothesis);
   void rank();
 
@@ -52,11 +55,10 @@ class GlobalSearch {
   HealthConfig health_;
   Stage stage_ = Stage::kIdle;
   ScanRays coarse_rays_, fine_rays_;
-  std::vector<Pose2> seeds_;
   std::size_t headings_ = 0, next_pose_ = 0, pose_count_ = 0, next_candidate_ = 0;
   int bins_x_ = 0, bins_y_ = 0;
   std::vector<Best> best_of_bin_;  ///< per square of 1 m and sector of 30 deg: keeps the candidates diverse
-  std::vector<Hypothesis> candidates_, hypotheses_;
+  std::vector<Hypothesis> candidates_, hypotheses_, seeds_;
   ParticleSet poses_;
   std::vector<float> cost_;
 };

@@ -53,8 +53,8 @@ struct MeasurementConfig {
 
 /// Which rays the map explains, and when the pose is to be trusted.
 struct HealthConfig {
-  double explained_m = 0.15;
-  double explained_per_range = 0.03;
+  double explained_m = 0.05;
+  double explained_per_range = 0.012;
   double ok_fraction = 0.60;
   double fresh_ok_fraction = 0.60;
   double lost_fraction = 0.40;

@@ -6,6 +6,11 @@
 #include <cmath>
 
 namespace knav {
+namespace {
+/// Searches in a row that find the estimate to be the best place, before it is believed; more where nothing but searches speaks
+/// for it: with two, `mit_csail` at 57 degrees began 11 m off, `ok` for 8 s.
+constexpr int kAgreements = 2, kAgreementsAnew = 4;
+}  // namespace
 
 PoseSearch::PoseSearch(const LocalizerConfig& config)
     : config_(config), search_(config.global_search, config.measurement, config.health) {}
@@ -107,6 +112,10 @@ bool PoseSearch::judge(const MapFields& fields, const Pose2& T_filter_now, Belie
       as_good += h.cost <= best_cost + margin;
     }
   }
+  // Where many places are better, or one half a metre off, it is none of the hypotheses; it has its price all the same.
+  if (!mine && !search_.seeds().empty() && same_place(search_.seeds().front().T_map_base * T_start_now_ * T_filter_now.inverse(), estimate)) {
+    mine = &search_.seeds().front();
+  }
   const double my_cost = mine ? mine->cost : 1.0, rival_cost = rival ? rival->cost : 1.0;
   const double lead = rival_cost - my_cost;
   const double needed = prior_ == Prior::kNone ? margin : prior_ == Prior::kGiven ? -margin : margin / 3.0;
@@ -117,7 +126,8 @@ bool PoseSearch::judge(const MapFields& fields, const Pose2& T_filter_now, Belie
       why_ = fmt::format("the best place found explains only {:.0f} % of the scan", 100.0 * mine->support);
       return false;
     }
-    if (++agreements_ >= 2 || lead > 3.0 * margin) {
+    const bool known_before = prior_ != Prior::kNone;
+    if (++agreements_ >= (known_before ? kAgreements : kAgreementsAnew) || (known_before && lead > 3.0 * margin)) {
       in_doubt_ = false;
     } else {
       why_ = "the place fits, to be confirmed";
