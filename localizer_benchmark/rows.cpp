@@ -141,11 +141,11 @@ LocalizerRows::Drives LocalizerRows::drives(std::size_t building, bool changed, 
   const int count = options_.quick ? 1 : std::max(1, static_cast<int>(std::ceil(metres / kDrive_m - 0.2)));  // laid-out drives are a little longer
   for (int k = 0; static_cast<int>(drives.profiles.size()) < count; ++k) {
     const SimulatedDrive drive = drive_of(building, changed, sensor, k, laid_out);
+    if (k > 2 * count + 2) throw UserError(drive.world_file + ": the robot gets stuck on most drives laid out through it.");
     if (std::optional<ProfileRecording> profiles = drive_unless_stuck(drive)) {
       drives.profiles.push_back(std::move(*profiles));
       drives.identity += recordings_.path_of(drive) + "\n";
     }
-    if (k > 2 * count + 2) throw UserError(drive.world_file + ": the robot gets stuck on most drives laid out through it.");
   }
   return drives;
 }

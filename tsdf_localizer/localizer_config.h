@@ -109,6 +109,8 @@ struct GlobalSearchConfig {
   int hypotheses = 24;
   int lookups_per_update = 3000000;
   double ambiguity_margin = 0.03;
+  int confirm_after = 2;
+  int confirm_anew_after = 4;
   int unseat_after = 10;
   int unseat_alone_after = 3;
   double unseat_alone_support = 0.75;
@@ -132,6 +134,9 @@ struct GlobalSearchConfig {
         "Map cells read per scan while searching (about 2 ns each), which bounds the time of an update.");
     v.number("ambiguity_margin", ambiguity_margin, 0, 1, "",
              "Another place whose price is within this of the best one's makes the place ambiguous.");
+    v.integer("confirm_after", confirm_after, 1, 100, "",
+              "Doubt of a pose that was known ends when that many searches in a row find it to be the best place.");
+    v.integer("confirm_anew_after", confirm_anew_after, 1, 100, "", "The same, of a pose that only searches speak for.");
     v.integer("unseat_after", unseat_after, 1, 100, "",
               "A pose that was tracked is given up for another only if that many searches, from places repeat_after_m or "
               "repeat_after_rad apart, found the same other place clearly better, ...");

@@ -6,12 +6,6 @@
 #include <cmath>
 
 namespace knav {
-namespace {
-/// Searches in a row that find the estimate to be the best place, before it is believed; more where nothing but searches speaks
-/// for it: with two, `mit_csail` at 57 degrees began 11 m off, `ok` for 8 s.
-constexpr int kAgreements = 2, kAgreementsAnew = 4;
-}  // namespace
-
 PoseSearch::PoseSearch(const LocalizerConfig& config)
     : config_(config), search_(config.global_search, config.measurement, config.health) {}
 
@@ -127,7 +121,8 @@ bool PoseSearch::judge(const MapFields& fields, const Pose2& T_filter_now, Belie
       return false;
     }
     const bool known_before = prior_ != Prior::kNone;
-    if (++agreements_ >= (known_before ? kAgreements : kAgreementsAnew) || (known_before && lead > 3.0 * margin)) {
+    const GlobalSearchConfig& c = config_.global_search;
+    if (++agreements_ >= (known_before ? c.confirm_after : c.confirm_anew_after) || (known_before && lead > 3.0 * margin)) {
       in_doubt_ = false;
     } else {
       why_ = "the place fits, to be confirmed";

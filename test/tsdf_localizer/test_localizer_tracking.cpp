@@ -72,6 +72,7 @@ Figures follow(const Building& world, const DistanceMap& map, const ScanModel& m
   return f;
 }
 
+/// Twice what the local mapper drifts (docs/local_mapper.md).
 TEST(LocalizerTracking, FollowsALocalMapThatDriftsByOnePercent) {
   const Building office = test::office();
   const auto truth = test::drive(kTour, kRate_hz);
