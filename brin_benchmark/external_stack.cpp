@@ -1,5 +1,6 @@
 #include "brin_benchmark/external_stack.h"
 
+#include <fmt/format.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <ros/service.h>
 #include <std_srvs/Empty.h>
@@ -17,6 +18,8 @@ const char* const kAction = "move_base";
 const char* const kMapFrame = "map";
 const char* const kOdometryFrame = "odom";
 const char* const kBaseFrame = "base_link";
+/// Wall time in which the result of a goal must come that the server's status no longer lists.
+constexpr double kResultWithin_s = 2.0;
 constexpr double kPlacedWithin_m = 0.1, kPlacedWithin_rad = 0.05;  ///< a person who sets a robot down knows the place so well
 
 bool is_frame(const std::string& name, const char* frame) {
@@ -28,6 +31,7 @@ bool is_frame(const std::string& name, const char* frame) {
 ExternalStack::ExternalStack(ClockPacer* pacer, const std::string& wait_topic)
     : pacer_(pacer), listener_(tf_), watch_(handle_, kAction), client_(handle_, kAction, true) {
   initial_pose_ = handle_.advertise<geometry_msgs::PoseWithCovarianceStamped>("initialpose", 2);
+  results_ = handle_.subscribe(std::string(kAction) + "/result", 5, &ExternalStack::on_result, this);
   const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
   if (wait_topic.empty()) {
     answers_ = handle_.subscribe("/tf", 100, &ExternalStack::on_transforms, this, hints);
@@ -91,6 +95,8 @@ void ExternalStack::send_goal(const Pose2& T_map_goal) {
     const std::lock_guard<std::mutex> lock(mutex_);
     goal = ++goals_;
     has_goal_ = true;
+    unlisted_ = false;
+    sent_ = ros::Time::now();
     state_ = GoalState::kDriving;
     failure_.clear();
   }
@@ -104,14 +110,33 @@ void ExternalStack::send_goal(const Pose2& T_map_goal) {
 
 void ExternalStack::on_done(int goal, const actionlib::SimpleClientGoalState& state) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (goal != goals_) return;
+  if (goal != goals_ || !has_goal_) return;
+  if (state != actionlib::SimpleClientGoalState::LOST) {
+    end_goal(state == actionlib::SimpleClientGoalState::SUCCEEDED, state.getText(), state.toString());
+    return;
+  }
+  // A server lists what has ended for five seconds only, by a clock that may be fast: the client then takes the goal for lost
+  // and no longer hears its result, which may still be on its way.
+  unlisted_ = true;
+  unlisted_since_ = std::chrono::steady_clock::now();
+  if (last_result_.goal_id.stamp >= sent_) end_unlisted_goal();
+}
+
+void ExternalStack::on_result(const move_base_msgs::MoveBaseActionResult::ConstPtr& message) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  last_result_ = message->status;
+  if (has_goal_ && unlisted_ && last_result_.goal_id.stamp >= sent_) end_unlisted_goal();
+}
+
+void ExternalStack::end_unlisted_goal() {
+  end_goal(last_result_.status == actionlib_msgs::GoalStatus::SUCCEEDED, last_result_.text, fmt::format("status {}", last_result_.status));
+}
+
+void ExternalStack::end_goal(bool reached, const std::string& text, const std::string& state) {
   has_goal_ = false;
-  const bool reached = state == actionlib::SimpleClientGoalState::SUCCEEDED;
   state_ = reached ? GoalState::kReached : GoalState::kFailed;
-  // A server that was started anew does not know the goal; its text is an old one.
-  const bool lost = state == actionlib::SimpleClientGoalState::LOST;
-  failure_ = lost ? kServerGone : state.getText();
-  if (!reached && failure_.empty()) failure_ = "move_base gave the goal up (" + state.toString() + ") without a word.";
+  failure_ = text;
+  if (!reached && failure_.empty()) failure_ = "move_base gave the goal up (" + state + ") without a word.";
 }
 
 void ExternalStack::cancel() {
@@ -127,6 +152,9 @@ bool ExternalStack::lost_server() const { return !has_server() || watch_.departu
 
 GoalState ExternalStack::take_state() {
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (has_goal_ && unlisted_ && std::chrono::duration<double>(std::chrono::steady_clock::now() - unlisted_since_).count() > kResultWithin_s) {
+    end_goal(false, "move_base no longer lists the goal, and no result of it came.", "");
+  }
   const GoalState state = state_;
   state_ = GoalState::kDriving;
   return state;

@@ -7,6 +7,7 @@
 #include <tf2_ros/transform_listener.h>
 #include <topic_tools/shape_shifter.h>
 
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -53,6 +54,10 @@ class ExternalStack {
  private:
   using Client = actionlib::SimpleActionClient<move_base_msgs::MoveBaseAction>;
   void on_done(int goal, const actionlib::SimpleClientGoalState& state);
+  void on_result(const move_base_msgs::MoveBaseActionResult::ConstPtr& message);
+  /// Both with the mutex held.
+  void end_goal(bool reached, const std::string& text, const std::string& state);
+  void end_unlisted_goal();
   void on_transforms(const tf2_msgs::TFMessage::ConstPtr& message);
   void on_answer(const topic_tools::ShapeShifter::ConstPtr& message);
 
@@ -70,6 +75,11 @@ class ExternalStack {
   bool has_goal_ = false;
   GoalState state_ = GoalState::kDriving;
   std::string failure_;
+  ros::Time sent_;
+  bool unlisted_ = false;  ///< the server's status lists the goal no longer, and its result has not come
+  std::chrono::steady_clock::time_point unlisted_since_;
+  actionlib_msgs::GoalStatus last_result_;
+  ros::Subscriber results_;  ///< after what its thread touches, so that it ends before
   Client client_;  ///< last, so that its thread ends first
 };
 

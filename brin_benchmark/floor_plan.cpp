@@ -72,7 +72,7 @@ std::vector<Point2> FloorPlan::path(const Point2& from, const Point2& to) const 
 std::vector<char> FloorPlan::open_cells(double clearance_m) const {
   std::vector<char> open(map_.global().geometry.cell_count(), 0);
   for (std::size_t i = 0; i < open.size(); ++i) {
-    open[i] = map_.global().clearance_of(map_.global().squared_cells[i]) >= clearance_m;
+    open[i] = map_.global().clearance_of(map_.global().squared[i]) >= clearance_m;
   }
   return open;
 }
@@ -158,7 +158,7 @@ std::optional<Point2> FloorPlan::start_inside() const {
   }
   if (largest.empty()) return std::nullopt;
   const auto roomier = [&](std::size_t a, std::size_t b) {
-    return map_.global().squared_cells[a] < map_.global().squared_cells[b];
+    return map_.global().squared[a] < map_.global().squared[b];
   };
   const std::size_t best = *std::max_element(largest.begin(), largest.end(), roomier);
   const auto width = static_cast<std::size_t>(g.width_cells);

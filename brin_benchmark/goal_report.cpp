@@ -12,6 +12,10 @@ namespace {
 
 double ratio(double a, double b) { return b > 0.0 ? a / b : 0.0; }
 
+Honesty honesty_from_json(const nlohmann::json& json) {
+  return {json.at("time_s"), json.at("ok_s"), json.at("uncertain_s"), json.at("lost_s"), json.at("initializing_s"), json.at("ok_wrong_s")};
+}
+
 nlohmann::json to_json(const GoalResult& r) {
   return {{"goal", to_json(std::vector<SuiteRun>{{"", "", {r.goal}}})[0]["goals"][0]},
           {"right", r.right()},
@@ -22,7 +26,11 @@ nlohmann::json to_json(const GoalResult& r) {
           {"time_s", r.time_s},
           {"distance_m", r.distance_m},
           {"standing_s", r.standing_s},
-          {"lost_s", r.lost_s},
+          {"localization", to_json(r.localization)},
+          {"carried_off", r.carried_off},
+          {"noticed_s", r.recovery.noticed_s},
+          {"right_s", r.recovery.right_s},
+          {"ok_wrong_s", r.recovery.ok_wrong_s},
           {"estimate_off_m", r.estimate_off_m},
           {"true_off_m", r.true_off_m},
           {"turned_round", r.turned_round},
@@ -43,7 +51,11 @@ GoalResult goal_from_json(const nlohmann::json& json, const std::string& file) {
   r.time_s = json.at("time_s");
   r.distance_m = json.at("distance_m");
   r.standing_s = json.at("standing_s");
-  r.lost_s = json.at("lost_s");
+  r.localization = honesty_from_json(json.at("localization"));
+  r.carried_off = json.at("carried_off");
+  r.recovery.noticed_s = json.at("noticed_s");
+  r.recovery.right_s = json.at("right_s");
+  r.recovery.ok_wrong_s = json.at("ok_wrong_s");
   r.estimate_off_m = json.at("estimate_off_m");
   r.true_off_m = json.at("true_off_m");
   r.turned_round = json.at("turned_round");
@@ -80,6 +92,12 @@ GoalScore score(const std::vector<GoalRunResult>& runs) {
         s.true_off_max_m = std::max(s.true_off_max_m, r.true_off_m);
         s.estimate_off_mean_m += r.estimate_off_m;
         s.true_off_mean_m += r.true_off_m;
+      }
+      s.localization.add(r.localization);
+      if (r.carried_off) {
+        ++s.carried_off;
+        s.noticed += r.recovery.noticed() ? 1 : 0;
+        s.localized_again += r.recovery.right() ? 1 : 0;
       }
       if (r.goal.kidnap) {
         ++s.kidnapped;
@@ -132,6 +150,10 @@ nlohmann::json to_json(const GoalScore& s) {
           {"given_up_max_s", s.given_up_max_s},
           {"kidnapped", s.kidnapped},
           {"found_again", s.found_again},
+          {"carried_off", s.carried_off},
+          {"noticed", s.noticed},
+          {"localized_again", s.localized_again},
+          {"localization", to_json(s.localization)},
           {"collisions", s.collisions},
           {"walker_contacts", s.walker_contacts},
           {"time_s", s.time_s},
@@ -195,6 +217,10 @@ std::string goal_report_markdown(const std::vector<GoalRunResult>& runs, const s
   text += row("reversals in 20 s of driving", "<= 1", fmt::format("{:.2f} ({} turned round, {} swayed)", s.reversals_per_20s, s.turned_round, s.sways));
   text += row("cmd_vel in the second after the end", "0", fmt::format("{:.3f}", s.moved_after_mps));
   text += row("kidnapped on the way, arrived all the same", ">= 18 of 20", fmt::format("{} of {}", s.found_again, s.kidnapped));
+  text += row("carried off, not ok within 5 s", ">= 95 %", fmt::format("{} of {}", s.noticed, s.carried_off));
+  text += row("carried off, localized again (0.3 m, 5 deg) within 40 s", ">= 90 %", fmt::format("{} of {}", s.localized_again, s.carried_off));
+  text += row("ok while more than 0.5 m off, without 5 s after being carried off", "< 0.1 %",
+              fmt::format("{:.3f} %, {:.1f} of {:.0f} s", 100.0 * ratio(s.localization.ok_wrong_s, s.localization.time_s), s.localization.ok_wrong_s, s.localization.time_s));
   text += row("plans a second while driving", ">= 5", fmt::format("{:.2f}", s.plans_per_s));
   text += row("the robot's work, a frame; longest control step", "", fmt::format("{:.1f} ms; {:.0f} ms", s.frame_cost_ms, s.control_max_ms));
 
@@ -225,7 +251,7 @@ std::string goal_report_markdown(const std::vector<GoalRunResult>& runs, const s
       heading = true;
       text += fmt::format("- {}, goal {} ({}{}), after {:.0f} s and {:.0f} m{}{}: {}\n", run.name, i + 1, r.goal.kind,
                           r.goal.kidnap ? ", kidnapped" : "", r.time_s, r.distance_m,
-                          r.collisions > 0 ? ", ran into something" : "", r.lost_s > 1.0 ? fmt::format(", {:.0f} s lost", r.lost_s) : "",
+                          r.collisions > 0 ? ", ran into something" : "", r.localization.lost_s > 1.0 ? fmt::format(", {:.0f} s lost", r.localization.lost_s) : "",
                           r.reached ? "reached." : r.reason);
     }
   }

@@ -11,6 +11,8 @@ namespace knav {
 /// All runs together, beside what is asked for.
 struct GoalScore {
   int goals = 0, reachable = 0, reached = 0, unreachable = 0, right = 0, right_in_time = 0, kidnapped = 0, found_again = 0;
+  int carried_off = 0, noticed = 0, localized_again = 0;  ///< of those kidnapped for whom there was room
+  Honesty localization;
   int collisions = 0, walker_contacts = 0;
   int turned_round = 0, sways = 0;
   double time_s = 0.0, distance_m = 0.0;  ///< of those reached, kidnaps left out

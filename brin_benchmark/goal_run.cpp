@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "brin_benchmark/closed_loop.h"
 #include "brin_benchmark/direction_watch.h"
@@ -40,7 +41,7 @@ class GoalDriver {
     if (goal.kidnap) limit_s += kKidnapped_s + 2.0 * distance_m(goal.T_world_kidnap, goal.T_world_goal) / kSlow_mps;
     const ContactCount before = loop_.simulator().contacts();
     directions_.start(loop_.simulator().T_world_base());
-    bool carried_off = !goal.kidnap;
+    watch_.reset();
     bool active = loop_.stack().set_goal(T_map_goal);
     if (!active) note_failure();
     while (active) {
@@ -55,12 +56,16 @@ class GoalDriver {
         loop_.stack().cancel();
       }
       const double driven_m = loop_.simulator().distance_driven_m() - start_m;
-      if (!carried_off && driven_m > std::min(kCarriedOffAfter_m, 0.5 * straight_m)) {
+      if (goal.kidnap && !result_.carried_off && driven_m > std::min(kCarriedOffAfter_m, 0.5 * straight_m)) {
         // Somebody may stand there: then a little later.
-        carried_off = loop_.kidnap(goal.T_world_kidnap);
-        if (carried_off) directions_.start(loop_.simulator().T_world_base());
+        result_.carried_off = loop_.kidnap(goal.T_world_kidnap);
+        if (!result_.carried_off) continue;
+        directions_.start(loop_.simulator().T_world_base());
+        watch_.emplace(loop_.now_s());
       }
     }
+    if (watch_) result_.recovery = watch_->recovery();
+    watch_.reset();
     result_.time_s = loop_.now_s() - start_s;
     result_.distance_m = loop_.simulator().distance_driven_m() - start_m;
     result_.turned_round = directions_.turned_round();
@@ -99,9 +104,23 @@ class GoalDriver {
       last_plans_ = plans;
       directions_.add(loop_.simulator().T_world_base());
       if (std::abs(command.v_mps) < kStands_mps && std::abs(command.w_radps) < kStands_radps) result_.standing_s += kWatch_s;
-      if (loop_.stack().verdict() == LocalizationVerdict::kLost) result_.lost_s += kWatch_s;
+      watch_localization();
     }
     return command;
+  }
+
+  void watch_localization() {
+    const Pose2 T_map_robot = world_in_map_ * loop_.simulator().T_world_base();
+    Moment m;
+    Pose2 T_map_estimate;
+    m.stamp_s = loop_.now_s();
+    m.dt_s = kWatch_s;
+    m.verdict = loop_.stack().verdict();
+    m.has_pose = loop_.stack().estimate(&T_map_estimate);
+    m.error_m = distance_m(T_map_estimate, T_map_robot);
+    m.error_rad = std::abs(normalize_angle_rad(T_map_estimate.yaw_rad - T_map_robot.yaw_rad));
+    if (watch_) watch_->add(m);
+    if (!watch_ || !watch_->forgiven(m)) result_.localization.add(m);
   }
 
   void note_failure() {
@@ -123,6 +142,7 @@ class GoalDriver {
   int plans_ = 0;
   std::size_t last_plans_ = 0;
   DirectionWatch directions_;
+  std::optional<KidnapWatch> watch_;  ///< while the robot that was carried off has not ended the goal
   Ticker polling_{1.0}, watching_{kWatch_s};
 };
 

@@ -6,6 +6,7 @@
 
 #include "brin_benchmark/benchmark.h"
 #include "brin_benchmark/goal_suite.h"
+#include "brin_benchmark/localization_watch.h"
 
 namespace knav {
 
@@ -23,7 +24,9 @@ struct GoalResult {
   int turned_round = 0, sways = 0;
   int collisions = 0, walker_contacts = 0;
   double moved_after_mps = 0.0;    ///< largest command within a second after the end; |v| + |w|
-  double lost_s = 0.0;             ///< of time_s, the localizer said lost
+  Honesty localization;            ///< over time_s, without kNoticeLimit_s after being carried off
+  bool carried_off = false;
+  KidnapRecovery recovery;         ///< if carried off
 
   bool right() const {
     return goal.expected == Expected::kReached ? reached : right_reason(goal.expected, static_cast<FailureCode>(failure_code));

@@ -9,6 +9,7 @@
 #include "brin_benchmark/benchmark_report.h"
 #include "brin_benchmark/protocol.h"
 #include "brin_benchmark/run_jobs.h"
+#include "brin_benchmark/truth_map.h"
 #include "core/config.h"
 #include "core/error.h"
 #include "core/file_io.h"
@@ -28,6 +29,7 @@ nlohmann::json identity(const GoalSessionOptions& o) {
           {"world_text", text(o.world)},
           {"tour_text", text(o.tour)},
           {"map", o.map},
+          {"true_map", o.true_map},
           {"config", o.config},
           {"config_text", text(o.config)},
           {"calibration_text", text(o.calibration)},
@@ -65,28 +67,32 @@ GoalSession::GoalSession(const GoalSessionOptions& options) : options_(options) 
   if (options_.run < 0 || options_.run > options_.suite.runs) {
     throw UserError(fmt::format("--run {}: there are {} runs.", options_.run, options_.suite.runs));
   }
+  if (options_.true_map && !options_.map.empty()) throw UserError("--true-map and --map: choose one map.");
   claim_folder(options_.out, identity(options_), "goals");
 }
 
 std::string GoalSession::stem(std::size_t run) const { return fmt::format("{}/run_{:02}", options_.out, run + 1); }
 
+MapDirectory GoalSession::make_map(const SessionProgress& progress) const {
+  if (!options_.map.empty()) return load_map(options_.map);
+  if (options_.true_map) return truth_map_directory(setup_.world);
+  std::vector<Waypoint> none;
+  return map_world(setup_, &none, [&](const std::string& stage, double fraction) {
+           progress(stage, fraction, fmt::format("{:.0f} m", setup_.tour.length_m()));
+         }).map;
+}
+
 void GoalSession::map(const SessionProgress& progress) {
   const std::string folder = options_.out + "/map", file = options_.out + "/suite.json";
-  if (!is_map_directory(folder) && !options_.map.empty()) {
-    MapDirectory made = load_map(options_.map);
-    paint_keepout(setup_.world, WorldInMap(setup_.world, made, setup_.world.spawn), &made);
+  // A map's origin is where its drive began.
+  const Pose2 T_world_map = options_.true_map ? Pose2{} : setup_.world.spawn;
+  if (!is_map_directory(folder)) {
+    MapDirectory made = make_map(progress);
+    paint_keepout(setup_.world, WorldInMap(setup_.world, made, T_world_map), &made);
     save_map(folder, made, true);
-  } else if (!is_map_directory(folder)) {
-    std::vector<Waypoint> none;
-    BuiltMap built = map_world(setup_, &none, [&](const std::string& stage, double fraction) {
-      progress(stage, fraction, fmt::format("{:.0f} m", setup_.tour.length_m()));
-    });
-    paint_keepout(setup_.world, WorldInMap(setup_.world, built.map, setup_.world.spawn), &built.map);
-    save_map(folder, built.map, true);
   }
   map_ = load_map(folder);
-  // A map's origin is where its drive began.
-  world_in_map_ = std::make_unique<WorldInMap>(setup_.world, map_, setup_.world.spawn);
+  world_in_map_ = std::make_unique<WorldInMap>(setup_.world, map_, T_world_map);
   if (!fs::exists(file)) {
     progress("drawing goals", 0.0, "");
     const std::vector<SuiteRun> drawn = draw_goals(setup_.world, map_, *world_in_map_, options_.suite);

@@ -13,13 +13,14 @@ namespace knav {
 struct GoalSessionOptions {
   std::string world, tour, map, config, calibration, out;
   std::string sensor = "calibrated", odometry = "default";
+  bool true_map = false;  ///< a map of the walls as they are instead of a mapping drive
   GoalSuiteConfig suite;
   int run = 0;  ///< counted from 1; 0 = all
   bool quick = false;
   int jobs = 1;
 };
 
-/// Goals in one building, in a folder: the map first (driven, or `map` taken over), then the goals, then the runs, each written whole when it ends.
+/// Goals in one building, in a folder: the map first (driven, true, or `map` taken over), then the goals, then the runs, each written whole when it ends.
 ///
 ///   setup.json                      what it is of; another one is refused
 ///   map/, suite.json                of the mapping drive (keepout painted in), and the goals that were drawn
@@ -39,6 +40,7 @@ class GoalSession {
   void run(const RecorderFactory& recorder, const SessionProgress& progress);
 
  private:
+  MapDirectory make_map(const SessionProgress& progress) const;
   std::string stem(std::size_t run) const;
   void drive(std::size_t run, const RecorderFactory& recorder, const std::function<void(double)>& progress);
 

@@ -24,8 +24,8 @@ into the map's keepout mask. Further goals have the robot carried off on the way
 OUT receives map/ (of the mapping drive), suite.json (the goals, and each run's changes as a world file has them), run_NN.json,
 .png (truth green, estimate red, crosses where it went wrong), _truth.tum, _estimate.tum, run_NN_GOAL.bag with the 30 s before
 what went wrong, report.json and report.md. What OUT has already is not driven again; --merge puts several buildings together.
-run_NN.json: goals[] with right, reached, failure_code, reason, time_s, distance_m, standing_s, lost_s (of time_s),
-estimate_off_m and true_off_m from the goal, turned_round and sways (changes of mind), collisions, walker_contacts.
+run_NN.json: goals[] with right, reached, failure_code, reason, time_s, distance_m, standing_s, localization (over time_s, without
+5 s after being carried off: ok_s, lost_s, ok_wrong_s, ...), carried_off, noticed_s, right_s (since then, -1 never), estimate_off_m and true_off_m from the goal, turned_round and sways (changes of mind), collisions, walker_contacts.
 report.json: the sums, with the names of report.md.)";
 
 std::string about_today() {
@@ -67,7 +67,8 @@ void drive(const GoalSessionOptions& options) {
   report(options.out, read_goal_results(options.out),
          {about_today(), fmt::format("world {}, {} people", options.world, options.suite.people),
           fmt::format("config {}, sensor {}, odometry {}, seed {}{}", options.config.empty() ? "default" : options.config,
-                      options.sensor, options.odometry, options.suite.seed, options.quick ? ", quick" : "")});
+                      options.sensor, options.odometry, options.suite.seed,
+                      std::string(options.true_map ? ", true map" : "") + (options.quick ? ", quick" : ""))});
 }
 
 void merge(const std::vector<std::string>& folders, const std::string& out) {
@@ -95,6 +96,7 @@ int main(int argc, char** argv) {
   app.add_option("--world", options.world, "world of the mapping drive, e.g. config/worlds/demo_goals.yaml");
   app.add_option("--tour", options.tour, "script of the mapping drive; laid out by itself if there is none");
   app.add_option("--map", options.map, "map directory of this building, its origin at the world's spawn; instead of a mapping drive");
+  app.add_flag("--true-map", options.true_map, "a map of the walls as they are; instead of a mapping drive");
   app.add_option("--config", options.config, "default, paper_full, paper_baseline, paper_literal, or a file")->default_str("default");
   app.add_option("--calibration", options.calibration, "depth calibration of the simulated Kinect");
   app.add_option("--sensor", options.sensor, "sensor preset of the simulator")->capture_default_str();

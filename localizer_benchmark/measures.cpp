@@ -8,8 +8,7 @@
 namespace knav {
 namespace {
 
-constexpr double kStartLimit_s = 30.0, kNoticeLimit_s = 5.0, kKidnapLimit_s = 40.0;
-constexpr double kGrace_s = 5.0;  // after a kidnap; wrong and ok is not counted then
+constexpr double kStartLimit_s = 30.0;
 constexpr double kLost_m = 1.0, kLostFor_s = 5.0;
 
 Eigen::Matrix3d placing_covariance() { return Eigen::Vector3d(0.1 * 0.1, 0.1 * 0.1, 0.05 * 0.05).asDiagonal(); }
@@ -37,36 +36,6 @@ std::size_t end_of(const ScanRecording& drive, std::size_t stretch) {
 }
 
 }  // namespace
-
-bool is_right(const Moment& m) { return m.has_pose && m.error_m <= kRight_m && m.error_rad <= kRight_deg * kPi / 180.0; }
-
-void Honesty::add(const Moment& m) {
-  time_s += m.dt_s;
-  switch (m.verdict) {
-    case LocalizationVerdict::kOk:
-      ok_s += m.dt_s;
-      if (!(m.error_m <= kWrong_m)) ok_wrong_s += m.dt_s;
-      break;
-    case LocalizationVerdict::kUncertain:
-      uncertain_s += m.dt_s;
-      break;
-    case LocalizationVerdict::kLost:
-      lost_s += m.dt_s;
-      break;
-    case LocalizationVerdict::kInitializing:
-      initializing_s += m.dt_s;
-      break;
-  }
-}
-
-void Honesty::add(const Honesty& o) {
-  time_s += o.time_s;
-  ok_s += o.ok_s;
-  uncertain_s += o.uncertain_s;
-  lost_s += o.lost_s;
-  initializing_s += o.initializing_s;
-  ok_wrong_s += o.ok_wrong_s;
-}
 
 void TrackingScore::add(const TrackingScore& o) {
   honesty.add(o.honesty);
@@ -165,7 +134,8 @@ RecoveryScore measure_kidnaps(const ScanRecording& drive, const MapInWorld& map,
     const std::size_t begin = drive.begins[k], end = end_of(drive, k);
     if (begin == end) continue;
     const std::uint32_t epoch_before = begin > 0 ? drive.frames[begin - 1].epoch : 0;
-    double noticed_s = -1.0, right_s = -1.0, wrong_s = 0.0, epoch_s = -1.0;
+    KidnapWatch watch(drive.frames[begin].stamp_s);
+    double epoch_s = -1.0;
     bool helped = false;
     Moment m;
     for (std::size_t i = begin; i < end; ++i) {
@@ -178,29 +148,26 @@ RecoveryScore measure_kidnaps(const ScanRecording& drive, const MapInWorld& map,
       m = ask(localizer, drive, i, map, &scan);
       if (moments) moments->push_back(m);
       if (since_s <= kKidnapLimit_s && k > 0) {
-        if (since_s > kGrace_s) {
-          score.honesty.add(m);
-          if (m.ok() && m.error_m > kWrong_m) wrong_s += m.dt_s;
-        }
+        watch.add(m);
+        if (!watch.forgiven(m)) score.honesty.add(m);
         if (epoch_s < 0.0 && drive.frames[i].epoch != epoch_before) epoch_s = since_s;
-        if (noticed_s < 0.0 && !m.ok()) noticed_s = since_s;
-        if (right_s < 0.0 && m.ok() && is_right(m)) right_s = since_s;
       }
     }
     const bool ready = was_right;
     was_right = m.ok() && is_right(m);
     if (k == 0) continue;
     ++score.trials;
-    if (noticed_s >= 0.0 && noticed_s <= kNoticeLimit_s) {
+    const KidnapRecovery& recovery = watch.recovery();
+    if (recovery.noticed()) {
       ++score.noticed;
-      score.noticed_s.push_back(noticed_s);
+      score.noticed_s.push_back(recovery.noticed_s);
     }
-    if (right_s >= 0.0) {
+    if (recovery.right()) {
       ++score.right;
-      score.right_s.push_back(right_s);
+      score.right_s.push_back(recovery.right_s);
     }
     const Pose2& at = drive.frames[begin].T_world_base;
-    score.each.push_back({{"x_m", at.x_m}, {"y_m", at.y_m}, {"yaw_rad", at.yaw_rad}, {"noticed_s", noticed_s}, {"right_s", right_s}, {"ok_wrong_s", wrong_s}, {"mapper_noticed_s", epoch_s}, {"knew_before", ready}});
+    score.each.push_back({{"x_m", at.x_m}, {"y_m", at.y_m}, {"yaw_rad", at.yaw_rad}, {"noticed_s", recovery.noticed_s}, {"right_s", recovery.right_s}, {"ok_wrong_s", recovery.ok_wrong_s}, {"mapper_noticed_s", epoch_s}, {"knew_before", ready}});
     stop_if_interrupted();
   }
   return score;

@@ -4,38 +4,12 @@
 #include <string>
 #include <vector>
 
+#include "brin_benchmark/localization_watch.h"
 #include "core/distance_map.h"
 #include "localizer_benchmark/scan_recording.h"
 #include "tsdf_localizer/localizer.h"
 
 namespace knav {
-
-/// What the localizer said after one scan, beside the truth.
-struct Moment {
-  double stamp_s = 0.0;
-  double dt_s = 0.0;  ///< how long it held
-  bool has_pose = false;
-  LocalizationVerdict verdict = LocalizationVerdict::kInitializing;
-  double error_m = 0.0, error_rad = 0.0;
-  double support = 0.0, fresh_support = 0.0;
-  Pose2 T_world_base;  ///< the truth
-  bool ok() const { return verdict == LocalizationVerdict::kOk; }
-};
-
-/// Right: near enough to go on from.
-constexpr double kRight_m = 0.3, kRight_deg = 5.0;
-/// Wrong enough to hurt.
-constexpr double kWrong_m = 0.5;
-
-bool is_right(const Moment& moment);
-
-/// How long a robot was how wrong. Rows of the report add up.
-struct Honesty {
-  double time_s = 0.0, ok_s = 0.0, uncertain_s = 0.0, lost_s = 0.0, initializing_s = 0.0;
-  double ok_wrong_s = 0.0;  ///< ok while more than kWrong_m off
-  void add(const Moment& moment);
-  void add(const Honesty& other);
-};
 
 struct TrackingScore {
   Honesty honesty;

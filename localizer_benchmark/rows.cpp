@@ -12,7 +12,7 @@
 #include "core/file_io.h"
 #include "global_map_builder/map_directory.h"
 #include "kinect_sim/tour_recorder.h"
-#include "localizer_benchmark/truth_map.h"
+#include "brin_benchmark/truth_map.h"
 
 namespace fs = std::filesystem;
 
@@ -39,22 +39,16 @@ double mean(const std::vector<T>& values) {
   return values.empty() ? std::nan("") : sum / static_cast<double>(values.size());
 }
 
-nlohmann::json honesty_json(const Honesty& h) {
-  return {{"time_s", h.time_s}, {"ok_s", h.ok_s}, {"uncertain_s", h.uncertain_s}, {"lost_s", h.lost_s},
-          {"initializing_s", h.initializing_s}, {"ok_wrong_s", h.ok_wrong_s},
-          {"ok_percent", h.time_s > 0.0 ? 100.0 * h.ok_s / h.time_s : 0.0}};
-}
-
 nlohmann::json tracking_json(const TrackingScore& s) {
   const double deg = 180.0 / kPi;
-  return {{"path_m", s.path_m}, {"honesty", honesty_json(s.honesty)}, {"lost_spans", s.lost_spans},
+  return {{"path_m", s.path_m}, {"honesty", to_json(s.honesty)}, {"lost_spans", s.lost_spans},
           {"mean_m", mean(s.error_m)}, {"p95_m", quantile(s.error_m, 0.95)}, {"worst_m", s.worst_m},
           {"worst_at", {{"s", s.worst_s}, {"x_m", s.worst_x_m}, {"y_m", s.worst_y_m}}},
           {"mean_deg", deg * mean(s.error_rad)}, {"p95_deg", deg * quantile(s.error_rad, 0.95)}, {"worst_deg", deg * quantile(s.error_rad, 1.0)}};
 }
 
 nlohmann::json recovery_json(const RecoveryScore& s) {
-  return {{"trials", s.trials}, {"noticed", s.noticed}, {"right", s.right}, {"honesty", honesty_json(s.honesty)},
+  return {{"trials", s.trials}, {"noticed", s.noticed}, {"right", s.right}, {"honesty", to_json(s.honesty)},
           {"noticed_median_s", quantile(s.noticed_s, 0.5)}, {"right_median_s", quantile(s.right_s, 0.5)},
           {"right_p95_s", quantile(s.right_s, 0.95)}, {"each", s.each}};
 }

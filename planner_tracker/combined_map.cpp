@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/surface_code.h"
 
 namespace knav {
 namespace {
@@ -12,6 +13,12 @@ constexpr auto kOpen = static_cast<std::uint8_t>(CellState::kFree);
 
 const std::uint8_t* bytes(const std::vector<CellState>& state) {
   return reinterpret_cast<const std::uint8_t*>(state.data());
+}
+
+/// @param x, y  [cells]
+SurfaceOffset offset(double x, double y, int units_per_cell) {
+  const auto units = [&](double cells) { return static_cast<std::int8_t>(std::lround(std::clamp(cells, -0.5, 0.5) * units_per_cell)); };
+  return {units(x), units(y)};
 }
 
 bool same_grid(const GridGeometry& a, const GridGeometry& b) {
@@ -23,8 +30,8 @@ bool same_grid(const GridGeometry& a, const GridGeometry& b) {
 }  // namespace
 
 int MapLayer::squared_for(double clearance_m) const {
-  const double cells = clearance_m / geometry.resolution_m + surface_cells;
-  return std::max(1, static_cast<int>(std::ceil(cells * cells - 1e-9)));
+  const double units = (clearance_m / geometry.resolution_m + surface_cells) * units_per_cell;
+  return std::max(1, static_cast<int>(std::ceil(units * units - 1e-9)));
 }
 
 CombinedMap::CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s, double surface_cells)
@@ -36,10 +43,14 @@ CombinedMap::CombinedMap(double reach_m, int occupied_threshold, int free_thresh
   global_.surface_cells = surface_cells;
 }
 
-CellState CombinedMap::local_state(std::int8_t value) const {
+CellState CombinedMap::global_state(std::int8_t value) const {
   if (value < 0) return CellState::kUnknown;
   if (value >= occupied_threshold_) return CellState::kOccupied;
   return value <= free_threshold_ ? CellState::kFree : CellState::kUnknown;
+}
+
+CellState CombinedMap::local_state(std::int8_t value) const {
+  return SurfaceCode::is_code(value) ? CellState::kFree : global_state(value);
 }
 
 void CombinedMap::set_global(const DistanceMap& distance, const OccupancyGrid& occupancy,
@@ -59,13 +70,14 @@ void CombinedMap::set_global(const DistanceMap& distance, const OccupancyGrid& o
   }
   const int reach_cells =
       std::clamp(static_cast<int>(std::ceil(reach_m_ / geometry.resolution_m + 0.5)), 1, 126);
-  distance_ = TruncatedDistance(reach_cells);
+  distance_ = TruncatedDistance(reach_cells, TruncatedDistance::finest_units(reach_cells));
   global_.geometry = geometry;
   global_.reach_cells = reach_cells;
+  global_.units_per_cell = distance_.units_per_cell();
   global_.state.assign(cells, CellState::kUnknown);
   for (std::size_t i = 0; i < cells; ++i) {
     CellState state = CellState::kFree;
-    if (has_occupancy) state = local_state(occupancy.value[i]);
+    if (has_occupancy) state = global_state(occupancy.value[i]);
     if (has_distance && state == CellState::kFree) {
       // The contour may cut a cell that the occupancy grid calls free: within half a cell it is occupied.
       const float d = distance.distance_m[i];
@@ -77,15 +89,39 @@ void CombinedMap::set_global(const DistanceMap& distance, const OccupancyGrid& o
     if (!keepout.value.empty() && keepout.value[i] >= 50) state = CellState::kKeepout;
     global_.state[i] = state;
   }
-  global_.squared_cells.assign(cells, 0);
-  distance_.update(geometry.width_cells, geometry.height_cells, bytes(global_.state), kOpen,
-                   {0, 0, geometry.width_cells, geometry.height_cells}, global_.squared_cells.data());
+  place_surfaces(distance);
+  global_.squared.assign(cells, 0);
+  update_clearance({0, 0, geometry.width_cells, geometry.height_cells}, &global_);
   combined_ = global_;
   local_window_ = {};
   local_cells_.clear();
   remembered_.clear();
   is_remembered_.assign(cells, 0);
   changed_cells_ = cells;
+}
+
+/// Of the cells that a surface runs through: along the distance's gradient, where it is 0.
+void CombinedMap::place_surfaces(const DistanceMap& distance) {
+  const GridGeometry& g = global_.geometry;
+  global_.surface.assign(g.cell_count(), {});
+  if (distance.empty()) return;
+  for (int iy = 1; iy + 1 < g.height_cells; ++iy) {
+    for (int ix = 1; ix + 1 < g.width_cells; ++ix) {
+      const std::size_t i = g.index(ix, iy);
+      const float* d = distance.distance_m.data() + i;
+      if (global_.state[i] != CellState::kOccupied || std::abs(*d) > g.resolution_m) continue;  // NaN is no less
+      const std::ptrdiff_t row = g.width_cells;
+      const double gx = 0.5 * static_cast<double>(d[1] - d[-1]), gy = 0.5 * static_cast<double>(d[row] - d[-row]);
+      const double slope = gx * gx + gy * gy;
+      if (!(slope > 0.1 * g.resolution_m * g.resolution_m)) continue;  // in the middle of something thin; beside the unknown
+      global_.surface[i] = offset(-static_cast<double>(*d) * gx / slope, -static_cast<double>(*d) * gy / slope, distance_.units_per_cell());
+    }
+  }
+}
+
+void CombinedMap::update_clearance(const CellWindow& window, MapLayer* layer) {
+  const GridGeometry& g = layer->geometry;
+  distance_.update(g.width_cells, g.height_cells, bytes(layer->state), kOpen, layer->surface.data(), window, layer->squared.data());
 }
 
 void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local, double now_s) {
@@ -134,11 +170,12 @@ void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_lo
   const GridGeometry& g = global_.geometry;
   const GridGeometry& l = local.geometry;
   local_cells_.resize(static_cast<std::size_t>(window.width()) * static_cast<std::size_t>(window.height()));
+  local_surface_.assign(local_cells_.size(), {});
   CellState by_value[256];
   for (int v = -128; v < 128; ++v) by_value[v + 128] = local_state(static_cast<std::int8_t>(v));
 
   // Free and unknown: each map cell asks the local cell its centre lies in; coordinates advance by constant steps
-  // along a row. Occupied: each local cell marks the one map cell its own centre lies in. Asked the first way as
+  // along a row. Occupied: each local cell marks the one map cell its surface lies in. Asked the first way as
   // well, it would mark up to four, and lanes would be a cell narrower or wider by how the local map lies; the
   // holes of one cell that this leaves in a turned wall are far narrower than any footprint. Only a map of much
   // finer cells is asked both ways: its walls would be dots.
@@ -162,12 +199,15 @@ void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_lo
   for (int iy = 0; iy < l.height_cells; ++iy) {
     for (int ix = 0; ix < l.width_cells; ++ix) {
       if (by_value[local.value[l.index(ix, iy)] + 128] != CellState::kOccupied) continue;
-      const double lx = l.center_x_m(ix), ly = l.center_y_m(iy);
-      const int gx = g.cell_x(T_map_local.x_m + c * lx - s * ly),
-                gy = g.cell_y(T_map_local.y_m + s * lx + c * ly);
+      const Point2 in_cell = surface_in_cell(local, ix, iy);
+      const double lx = l.center_x_m(ix) + in_cell.x_m * l.resolution_m, ly = l.center_y_m(iy) + in_cell.y_m * l.resolution_m;
+      const double mx = T_map_local.x_m + c * lx - s * ly, my = T_map_local.y_m + s * lx + c * ly;
+      const int gx = g.cell_x(mx), gy = g.cell_y(my);
       if (gx < window.x0 || gy < window.y0 || gx >= window.x1 || gy >= window.y1) continue;
-      local_cells_[static_cast<std::size_t>(gy - window.y0) * static_cast<std::size_t>(window.width()) +
-                   static_cast<std::size_t>(gx - window.x0)] = CellState::kOccupied;
+      const std::size_t i = static_cast<std::size_t>(gy - window.y0) * static_cast<std::size_t>(window.width()) +
+                            static_cast<std::size_t>(gx - window.x0);
+      local_cells_[i] = CellState::kOccupied;
+      local_surface_[i] = offset((mx - g.center_x_m(gx)) / g.resolution_m, (my - g.center_y_m(gy)) / g.resolution_m, distance_.units_per_cell());
     }
   }
 }
@@ -175,9 +215,11 @@ void CombinedMap::sample_local(const OccupancyGrid& local, const Pose2& T_map_lo
 const MapLayer& CombinedMap::permissive(const std::vector<Point2>& closed, double round_m) {
   permissive_.geometry = global_.geometry;
   permissive_.reach_cells = global_.reach_cells;
+  permissive_.units_per_cell = global_.units_per_cell;
   permissive_.surface_cells = global_.surface_cells;
+  permissive_.surface = combined_.surface;
   permissive_.state.resize(global_.state.size());
-  permissive_.squared_cells.resize(global_.state.size());
+  permissive_.squared.resize(global_.state.size());
   for (std::size_t i = 0; i < global_.state.size(); ++i) {
     const bool newly_free = global_.state[i] == CellState::kUnknown && combined_.state[i] == CellState::kFree;
     permissive_.state[i] = newly_free ? CellState::kFree : global_.state[i];
@@ -194,8 +236,7 @@ const MapLayer& CombinedMap::permissive(const std::vector<Point2>& closed, doubl
       }
     }
   }
-  distance_.update(g.width_cells, g.height_cells, bytes(permissive_.state), kOpen, {0, 0, g.width_cells, g.height_cells},
-                   permissive_.squared_cells.data());
+  update_clearance({0, 0, g.width_cells, g.height_cells}, &permissive_);
   return permissive_;
 }
 
@@ -228,8 +269,22 @@ CellState CombinedMap::held(int ix, int iy) const {
   return memory_s_ > 0.0 && showed && local == CellState::kUnknown && !on_local(ix, iy) ? CellState::kOccupied : local;
 }
 
-void CombinedMap::put(int ix, int iy, CellState now, CellWindow* dirty) {
+/// Where the surface is in a cell that is not free, whoever says that it is not.
+SurfaceOffset CombinedMap::surface_of(int ix, int iy, CellState local) const {
+  const CellWindow& w = local_window_;
   const std::size_t i = global_.geometry.index(ix, iy);
+  if (local != CellState::kOccupied || global_.state[i] == CellState::kKeepout) return global_.surface[i];
+  const bool shown = !w.empty() && ix >= w.x0 && ix < w.x1 && iy >= w.y0 && iy < w.y1 && local_cell(ix, iy) == CellState::kOccupied;
+  if (!shown) return combined_.surface[i];  // remembered
+  return local_surface_[static_cast<std::size_t>(iy - w.y0) * static_cast<std::size_t>(w.width()) + static_cast<std::size_t>(ix - w.x0)];
+}
+
+void CombinedMap::put(int ix, int iy, CellState now, SurfaceOffset surface, CellWindow* dirty) {
+  const std::size_t i = global_.geometry.index(ix, iy);
+  if (combined_.surface[i] != surface) {
+    combined_.surface[i] = surface;
+    if (now != CellState::kFree) dirty->include(ix, iy);
+  }
   if (now == combined_.state[i]) return;
   // Only a change between open and not open moves clearances.
   if ((now == CellState::kFree) != (combined_.state[i] == CellState::kFree)) dirty->include(ix, iy);
@@ -247,7 +302,7 @@ void CombinedMap::forget(CellWindow* dirty) {
     }
     const std::size_t i = global_.geometry.index(r.ix, r.iy);
     is_remembered_[i] = 0;
-    put(r.ix, r.iy, global_.state[i], dirty);
+    put(r.ix, r.iy, global_.state[i], global_.surface[i], dirty);
   }
   remembered_.resize(kept);
 }
@@ -268,7 +323,7 @@ void CombinedMap::apply(const CellWindow& window) {
       const std::size_t i = global_.geometry.index(ix, iy);
       if (is_remembered_[i] != 0) continue;
       const CellState local = held(ix, iy);
-      put(ix, iy, overlay(global_.state[i], local), &dirty);
+      put(ix, iy, overlay(global_.state[i], local), surface_of(ix, iy, local), &dirty);
       if (memory_s_ > 0.0 && local == CellState::kOccupied && combined_.state[i] == CellState::kOccupied &&
           global_.state[i] != CellState::kOccupied && !on_local(ix, iy)) {
         is_remembered_[i] = 1;
@@ -277,9 +332,7 @@ void CombinedMap::apply(const CellWindow& window) {
     }
   }
   if (dirty.empty()) return;
-  const GridGeometry& g = global_.geometry;
-  distance_.update(g.width_cells, g.height_cells, bytes(combined_.state), kOpen,
-                   dirty.grown(distance_.reach_cells() + 1), combined_.squared_cells.data());
+  update_clearance(dirty.grown(distance_.reach_cells() + 1), &combined_);
 }
 
 }  // namespace knav

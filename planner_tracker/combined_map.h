@@ -24,17 +24,18 @@ constexpr CellState overlay(CellState global, CellState local) {
 struct MapLayer {
   GridGeometry geometry;
   std::vector<CellState> state;
-  std::vector<std::int16_t> squared_cells;  ///< to the nearest cell that is not free, see TruncatedDistance
-  int reach_cells = 0;
-  /// Where in a cell that is not free its surface is taken to be, from the cell's middle [cells]: 0.5 its edge, which is never
-  /// too far; 0 its middle, which is right in the mean.
+  std::vector<SurfaceOffset> surface;  ///< of cells that are not free; empty: in their middles
+  std::vector<std::int16_t> squared;   ///< to the nearest cell that is not free, see TruncatedDistance
+  int reach_cells = 0, units_per_cell = 1;
+  /// What is taken off a clearance because the point and the surface lie anywhere in their cells [cells]: 0.5 and it is never too
+  /// far; 0 and it is right in the mean.
   double surface_cells = 0.5;
 
   CellState at(int ix, int iy) const {
     return geometry.contains(ix, iy) ? state[geometry.index(ix, iy)] : CellState::kUnknown;
   }
   std::int16_t squared_at(int ix, int iy) const {
-    return geometry.contains(ix, iy) ? squared_cells[geometry.index(ix, iy)] : std::int16_t{0};
+    return geometry.contains(ix, iy) ? squared[geometry.index(ix, iy)] : std::int16_t{0};
   }
   /// From the middle of a point's cell to the surface in the nearest cell that is not free [m]; at most about the layer's
   /// reach, 0 in cells that are not free and outside the map.
@@ -42,20 +43,23 @@ struct MapLayer {
     return clearance_of(squared_at(geometry.cell_x(x_m), geometry.cell_y(y_m)));
   }
   double clearance_of(std::int16_t squared) const {
-    return squared <= 0 ? 0.0 : (std::sqrt(static_cast<double>(squared)) - surface_cells) * geometry.resolution_m;
+    return squared <= 0 ? 0.0 : (std::sqrt(static_cast<double>(squared)) / units_per_cell - surface_cells) * geometry.resolution_m;
   }
-  /// Smallest squared_cells whose clearance is at least this.
+  /// Smallest `squared` whose clearance is at least this.
   int squared_for(double clearance_m) const;
+  /// What `squared` is at most.
+  int squared_cut() const { return (reach_cells + 1) * units_per_cell * (reach_cells + 1) * units_per_cell; }
 };
 
-/// The global map with the newest local map laid over it (paper section III.H, design section 4).
+/// The global map with the newest local map laid over it (paper section III.H, design section 4). Clearances are from where in their
+/// cells the surfaces are, as the distance map and the local map's SurfaceCode have it: by whole cells a lane just as wide as the
+/// robot needs is open in one frame's map and closed in the next.
 class CombinedMap {
  public:
   /// @param reach_m clearances are exact up to this
   /// @param memory_s  how long what the local map showed occupied stays so once it is off its edge. Without it a way closed
   /// at the edge is closed and open by turns as the robot turns away from it and back.
-  /// @param surface_cells  see MapLayer. Walls lie anywhere in their cells: from the cells' edges a lane would lose up to two
-  /// cells of its width, and be closed to a robot that fits. The tracker measures from the scan itself.
+  /// @param surface_cells  see MapLayer
   CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s = 0.0, double surface_cells = 0.0);
 
   /// @param occupancy may be empty if `distance` is not, and the other way round; @param keepout may be
@@ -83,13 +87,17 @@ class CombinedMap {
   std::size_t changed_cells() const { return changed_cells_; }
 
  private:
+  CellState global_state(std::int8_t value) const;
   CellState local_state(std::int8_t value) const;
+  void place_surfaces(const DistanceMap& distance);
+  void update_clearance(const CellWindow& window, MapLayer* layer);
   void sample_local(const OccupancyGrid& local, const Pose2& T_map_local, const CellWindow& window);
   void apply(const CellWindow& window);
   bool on_local(int ix, int iy) const;
   CellState local_cell(int ix, int iy) const;  ///< of a cell in `local_window_`
   CellState held(int ix, int iy) const;
-  void put(int ix, int iy, CellState now, CellWindow* dirty);
+  SurfaceOffset surface_of(int ix, int iy, CellState local) const;
+  void put(int ix, int iy, CellState now, SurfaceOffset surface, CellWindow* dirty);
   void forget(CellWindow* dirty);
 
   double reach_m_;
@@ -98,6 +106,7 @@ class CombinedMap {
   TruncatedDistance distance_;
   CellWindow local_window_;             ///< of the last local map
   std::vector<CellState> local_cells_;  ///< of `local_window_`, row-major
+  std::vector<SurfaceOffset> local_surface_;  ///< the same
   struct Remembered {
     int ix, iy;
     double until_s;

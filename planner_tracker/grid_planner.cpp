@@ -44,7 +44,7 @@ void GridPlanner::Search::label_parts(const MapLayer& layer) {
   std::vector<std::uint32_t> stack;
   std::uint16_t label = 0;
   for (std::size_t first = 0; first < part.size() && label < 65535; ++first) {
-    if (part[first] != 0 || !price.open(layer.squared_cells[first])) continue;
+    if (part[first] != 0 || !price.open(layer.squared[first])) continue;
     part[first] = ++label;
     stack.push_back(static_cast<std::uint32_t>(first));
     while (!stack.empty()) {

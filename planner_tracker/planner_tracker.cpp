@@ -167,6 +167,17 @@ void PlannerTracker::State::act(Activity activity, const TrackOutput& output) {
   command.w_radps = std::isfinite(output.w_radps) ? output.w_radps : 0.0;
 }
 
+/// Carried off, or localized at last: the way begins at another place than the one that the goal's time was reckoned from.
+void PlannerTracker::State::note_jump(double now_s, const RobotState& robot) {
+  constexpr double kElsewhere_m = 1.0;
+  constexpr int kMostJumps = 5;  // a localizer that jumps for ever must not keep a goal for ever
+  const Pose2 expected = T_map_odom * robot.T_odom_base;
+  T_map_odom = robot.T_map_base * robot.T_odom_base.inverse();
+  if (distance_m(expected, robot.T_map_base) < kElsewhere_m || ++jumps > kMostJumps) return;
+  relocalized = true;
+  watch.start(now_s);
+}
+
 Command PlannerTracker::State::step(double now_s, const RobotState& robot) {
   const bool jumped = last_step_s >= 0.0 && now_s < last_step_s - kClockJump_s;
   const double dt = last_step_s < 0.0 ? 1.0 / config.controller_frequency : now_s - last_step_s;
@@ -195,9 +206,13 @@ Command PlannerTracker::State::step(double now_s, const RobotState& robot) {
     goal_started = true;
     goal_start_s = now_s;
     goal_allowed_s = 1e9;
+    relocalized = false;
+    jumps = 0;
+    T_map_odom = robot.T_map_base * robot.T_odom_base.inverse();
     watch.start(now_s);
   }
   if (stopped_by_missing_data(now_s, robot)) return command;
+  note_jump(now_s, robot);
 
   input.T_map_base = robot.T_map_base;
   input.v_mps = previous_v;

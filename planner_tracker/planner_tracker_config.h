@@ -134,6 +134,8 @@ struct RecoveryConfig {
   double lost_timeout_s = 120.0;
   double lost_turn_radps = 0.5;
   double wander_radius_m = 3.0;
+  double wander_step_m = 2.5;
+  double wander_mps = 0.3;
   double avoid_min_m = 0.15;
   double avoid_max_m = 0.50;
 
@@ -142,7 +144,9 @@ struct RecoveryConfig {
     v.number("lost_timeout_s", lost_timeout_s, 1, 3600, "s", "Lost for this long, the goal fails.");
     v.number("lost_turn_radps", lost_turn_radps, 0.05, 3, "rad/s", "A lost robot looks round at this rate.");
     v.number("wander_radius_m", wander_radius_m, 0, 20, "m",
-             "... then wanders, at most this far from there.");
+             "... then wanders, at most this far from there; after each further look round as much farther, ...");
+    v.number("wander_step_m", wander_step_m, 0.1, 10, "m", "... in moves of up to this, ...");
+    v.number("wander_mps", wander_mps, 0.05, 1, "m/s", "... at this speed.");
     v.number("avoid_min_m", avoid_min_m, 0.05, 2, "m",
              "Shortest of the random translations towards open space.");
     v.number("avoid_max_m", avoid_max_m, 0.05, 5, "m", "Longest of them.");

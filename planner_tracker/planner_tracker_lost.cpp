@@ -10,18 +10,36 @@ namespace knav {
 namespace {
 
 constexpr double kFoundFor_s = 0.5;  ///< localized for this long ends the recovery
+constexpr int kMoves = 2;            ///< between two looks round
+constexpr double kShortest_m = 0.4;  ///< of these; shorter ones show nothing new
+constexpr double kSees_m = 4.0;      ///< a direction more open than this is not better
+
+/// How far straight on a robot stays within `radius_m` of where it was; from outside, 0 unless that leads back inside.
+double within_reach_m(const Pose2& T_odom_from, double radius_m, const Pose2& T_odom_base, double bearing_rad) {
+  const double x = T_odom_base.x_m - T_odom_from.x_m, y = T_odom_base.y_m - T_odom_from.y_m, heading = T_odom_base.yaw_rad + bearing_rad;
+  const double along = x * std::cos(heading) + y * std::sin(heading), across2 = x * x + y * y - along * along;
+  return across2 < radius_m * radius_m ? std::max(0.0, std::sqrt(radius_m * radius_m - across2) - along) : 0.0;
+}
 
 }  // namespace
 
 double PlannerTracker::State::free_way(const RobotState&, double bearing_rad, bool localized) const {
-  constexpr double kFar_m = 1.5;
   const double radius = tracker.safe_radius_m();
   if (localized) {
+    constexpr double kFar_m = 1.5;
     // By scan and map together, as far as the footprint goes; known only.
     return tracker.straight_free_m(input, bearing_rad, kFar_m);
   }
   // The map is of no use: only where the scan knows what is there.
-  return std::min(kFar_m, scan.free_m(bearing_rad, radius + config.clearance.hard_m, true));
+  return std::min(kSees_m, scan.free_m(bearing_rad, radius + config.clearance.hard_m, true));
+}
+
+/// Where it is cannot be told from here, as in a corridor: the longer it is lost, the farther it goes.
+void PlannerTracker::State::wander() {
+  lost_turn_done = true;
+  ++lost_rounds;
+  const double longest_m = std::max(config.recovery.wander_step_m, kShortest_m);
+  moves.start(kMoves, {kShortest_m, longest_m, kSees_m, config.recovery.wander_mps});
 }
 
 bool PlannerTracker::State::stopped_by_lost(double now_s, const RobotState& robot) {
@@ -30,6 +48,7 @@ bool PlannerTracker::State::stopped_by_lost(double now_s, const RobotState& robo
     if (!lost) return false;
     lost_since_s = now_s;
     lost_turn_done = false;
+    lost_rounds = 0;
     turned_rad = 0.0;
     last_yaw_rad = robot.T_odom_base.yaw_rad;
     T_odom_lost = robot.T_odom_base;
@@ -46,6 +65,7 @@ bool PlannerTracker::State::stopped_by_lost(double now_s, const RobotState& robo
     moves.end();
     explain("");
     next_plan_s = -1.0;
+    relocalized = true;
     watch.start(now_s);
     return false;
   }
@@ -66,18 +86,14 @@ bool PlannerTracker::State::stopped_by_lost(double now_s, const RobotState& robo
     constexpr double kAhead_rad = 0.3;
     if (tracker.turn_free_rad(scan_only, 1.0, kAhead_rad) < kAhead_rad) {
       // A corner of the footprint is in the way: a look from elsewhere then.
-      lost_turn_done = true;
-      moves.start(3);
+      wander();
     } else if (std::abs(turn.v_mps) < 0.01) {
       turn.w_radps = std::clamp(config.recovery.lost_turn_radps, input.w_radps - step, input.w_radps + step);
     }
     act(Activity::kLostTurning, turn);
     return true;
   }
-  if (!lost_turn_done) {
-    lost_turn_done = true;
-    moves.start(3);
-  }
+  if (!lost_turn_done) wander();
   if (!moves.active()) {
     // Looks round again from the new place.
     lost_turn_done = false;
@@ -86,10 +102,7 @@ bool PlannerTracker::State::stopped_by_lost(double now_s, const RobotState& robo
     return true;
   }
   const TrackOutput move = moves.step(input, robot.T_odom_base, [&](double bearing) {
-    const double way = free_way(robot, bearing, false);
-    const Pose2 end = robot.T_odom_base * Pose2{way * std::cos(bearing), way * std::sin(bearing), 0.0};
-    const double beyond = distance_m(end, T_odom_lost) - config.recovery.wander_radius_m;
-    return beyond > 0.0 ? way - beyond : way;
+    return std::min(free_way(robot, bearing, false), within_reach_m(T_odom_lost, config.recovery.wander_radius_m * lost_rounds, robot.T_odom_base, bearing));
   });
   act(Activity::kLostWandering, move);
   return true;

@@ -301,7 +301,7 @@ void PlannerTrackerNodelet::publish_costmap(const ros::TimerEvent&) {
   // clearance.
   const double hard = config_.hard_radius_m(), preferred = config_.preferred_radius_m();
   for (std::size_t i = 0; i < grid.data.size(); ++i) {
-    const double c = layer.clearance_of(layer.squared_cells[i]);
+    const double c = layer.clearance_of(layer.squared[i]);
     double value = c < hard ? 99.0 : c >= preferred ? 0.0 : 1.0 + 97.0 * (preferred - c) / (preferred - hard);
     if (layer.state[i] == CellState::kUnknown)
       value = -1.0;

@@ -36,6 +36,8 @@ struct PlannerTracker::State {
   Command step(double now_s, const RobotState& robot);
   void begin(const Pose2& T_map_goal);
   void end_goal();
+  void wander();
+  void note_jump(double now_s, const RobotState& robot);
 
   // Each returns true if it decided what to do.
   bool stopped_by_missing_data(double now_s, const RobotState& robot);
@@ -74,6 +76,9 @@ struct PlannerTracker::State {
   Pose2 goal;
   bool latched = false, goal_started = false;
   double goal_start_s = 0.0, goal_allowed_s = 0.0;
+  bool relocalized = false;  ///< the robot turned out to be elsewhere: what it may take begins anew from there
+  int jumps = 0;
+  Pose2 T_map_odom;          ///< of the last step
   Failure failure;
   std::string explanation;
   PlanKeeper::Outcome outcome = PlanKeeper::Outcome::kToGoal;
@@ -92,6 +97,7 @@ struct PlannerTracker::State {
   int avoidances = 0;
   double lost_since_s = -1.0, found_since_s = -1.0, turned_rad = 0.0, last_yaw_rad = 0.0;
   bool lost_turn_done = false;
+  int lost_rounds = 0;  ///< of looking round and wandering
   Pose2 T_odom_lost;
   std::size_t plans = 0;
   PlanResult asked;  ///< for make_plan

@@ -11,6 +11,8 @@ namespace {
 
 constexpr double kFailedPlanWait_s = 1.0;  ///< a search that finds nothing is the dearest
 constexpr double kGotOn_m = 0.05, kGotOn_rad = 0.2;
+constexpr double kAllowance_s = 60.0;
+constexpr double kOpenEnough_m = 1.5;  ///< for a step aside
 constexpr double kFloorSeenFrom_m = 1.2;  ///< nearer, a level Kinect at 0.5 m does not see the floor
 
 Point2 position(const Pose2& pose) { return {pose.x_m, pose.y_m}; }
@@ -100,7 +102,7 @@ bool PlannerTracker::State::arrived(const RobotState& robot) {
 bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
   if (now_s < next_plan_s) return false;
   next_plan_s = now_s + 1.0 / config.planner_frequency - 0.5 / config.controller_frequency;
-  const bool first = goal_allowed_s > 1e8;
+  const bool first = goal_allowed_s > 1e8, allowance_due = first || relocalized;
   ++plans;
   outcome = keeper.replan(map, robot.T_map_base, position(goal), now_s, moving.points());
   using Outcome = PlanKeeper::Outcome;
@@ -139,8 +141,9 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
       explain("The robot stands in or against something.");
       break;
   }
-  if (first && outcome == Outcome::kToGoal) {
-    goal_allowed_s = 60.0 + config.planning.slowness * keeper.path().length_m() / config.max_vel_x;
+  if (allowance_due && outcome == Outcome::kToGoal) {
+    relocalized = false;
+    goal_allowed_s = now_s - goal_start_s + kAllowance_s + config.planning.slowness * keeper.path().length_m() / config.max_vel_x;
   }
   return false;
 }
@@ -149,7 +152,7 @@ bool PlannerTracker::State::given_up(double now_s, const RobotState& robot) {
   keeper.path().advance(position(robot.T_map_base));
   watch.progress(now_s, keeper.path().remaining_m() + keeper.path().offset_m(), keeper.switched() && !keeper.elsewhere());
   const bool stuck = watch.without_progress_s(now_s) > config.planning.blocked_timeout_s;
-  const bool slow = now_s - goal_start_s > goal_allowed_s;
+  const bool slow = !relocalized && now_s - goal_start_s > goal_allowed_s;
   if (!stuck && !slow) return false;
   using Outcome = PlanKeeper::Outcome;
   if (outcome == Outcome::kStartBlocked) {
@@ -192,7 +195,7 @@ bool PlannerTracker::State::avoiding(double now_s, const RobotState& robot) {
     blocked_since_s = looking_since_s = near_since_s = -1.0;
     watch.dithering_s(now_s, robot.T_odom_base, false, 0.0);
     ++avoidances;
-    moves.start(blind ? 4 : 2);
+    moves.start(blind ? 4 : 2, {config.recovery.avoid_min_m, config.recovery.avoid_max_m, kOpenEnough_m, config.tracking.slow_mps + 0.05});
     explanation = waited        ? "Something stays in the way; trying random moves towards open space."
                   : blind       ? "The way is closed right here; stepping back to look again."
                   : oscillating ? "Driving without getting on; trying random moves towards open space."

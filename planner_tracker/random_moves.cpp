@@ -9,13 +9,13 @@ namespace knav {
 namespace {
 
 constexpr int kDirections = 24;
-constexpr double kOpenEnough_m = 1.5;  ///< more open than this is not better
-constexpr double kLongestMove_s = 8.0;
+constexpr double kTurn_s = 6.0;  ///< the longest that a move's turn may take
 
 }  // namespace
 
-void RandomMoves::start(int count) {
+void RandomMoves::start(int count, const Stride& stride) {
   left_ = count;
+  stride_ = stride;
   ++sequence_;
   move_ = 0;
   phase_ = Phase::kChoose;
@@ -33,7 +33,7 @@ void RandomMoves::choose(const Pose2& T_odom_base, const FreeWay& free_way) {
   for (int i = 0; i < kDirections; ++i) {
     bearing[i] = normalize_angle_rad(2.0 * kPi * (i + random.uniform()) / kDirections);
     const double way = free_way(bearing[i]);
-    free[i] = way >= config_.recovery.avoid_min_m + 0.05 ? std::min(way, kOpenEnough_m) : 0.0;
+    free[i] = way >= stride_.shortest_m + 0.05 ? std::min(way, stride_.open_enough_m) : 0.0;
     sum += free[i];
   }
   T_odom_start_ = T_odom_base;
@@ -56,15 +56,14 @@ void RandomMoves::choose(const Pose2& T_odom_base, const FreeWay& free_way) {
   }
   while (free[chosen] <= 0.0) --chosen;
   heading_odom_rad_ = normalize_angle_rad(T_odom_base.yaw_rad + bearing[chosen]);
-  distance_m_ = std::min(random.uniform(config_.recovery.avoid_min_m, config_.recovery.avoid_max_m),
-                         free[chosen] - 0.05);
+  distance_m_ = std::min(random.uniform(stride_.shortest_m, stride_.longest_m), free[chosen] - 0.05);
 }
 
 TrackOutput RandomMoves::step(const TrackInput& input, const Pose2& T_odom_base, const FreeWay& free_way) {
   if (!active()) return tracker_->stop(input);
   if (phase_ == Phase::kChoose) choose(T_odom_base, free_way);
   spent_s_ += input.dt_s;
-  if (spent_s_ > kLongestMove_s) {
+  if (spent_s_ > kTurn_s + 2.0 * stride_.longest_m / stride_.speed_mps) {
     next();
     return tracker_->stop(input);
   }
@@ -84,8 +83,7 @@ TrackOutput RandomMoves::step(const TrackInput& input, const Pose2& T_odom_base,
     return tracker_->stop(input);
   }
   TrackOutput out;
-  const double v =
-      std::min(config_.tracking.slow_mps + 0.05, std::sqrt(2.0 * 0.7 * config_.acc_lim_x * left));
+  const double v = std::min(stride_.speed_mps, std::sqrt(2.0 * 0.7 * config_.acc_lim_x * std::min(left, free_way(0.0))));
   out.v_mps = std::min(v, std::max(0.0, input.v_mps) + config_.acc_lim_x * input.dt_s);
   out.w_radps = std::clamp(1.5 * error, -0.4, 0.4);
   return out;

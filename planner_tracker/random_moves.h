@@ -18,8 +18,15 @@ class RandomMoves {
   RandomMoves(const PlannerTrackerConfig& config, const PathTracker& tracker)
       : config_(config), tracker_(&tracker) {}
 
+  /// Of the translations.
+  struct Stride {
+    double shortest_m, longest_m;
+    double open_enough_m;  ///< a direction more open than this is not better
+    double speed_mps;
+  };
+
   /// Begins a sequence. @param count of rotation and translation pairs
-  void start(int count);
+  void start(int count, const Stride& stride);
   bool active() const { return left_ > 0; }
   void end() { left_ = 0; }
 
@@ -35,6 +42,7 @@ class RandomMoves {
   std::uint64_t sequence_ = 0;  ///< the random stream's step: never the same moves twice in a run
   std::uint32_t move_ = 0;
   int left_ = 0;
+  Stride stride_{};
   enum class Phase { kChoose, kTurn, kGo } phase_ = Phase::kChoose;
   Pose2 T_odom_start_;
   double heading_odom_rad_ = 0.0;

@@ -19,7 +19,7 @@ ScanView::ScanView(double near_m, double reach_m)
   window_.geometry = {side, side, kCell_m, -0.5 * side * kCell_m, -0.5 * side * kCell_m};
   window_.reach_cells = distance_.reach_cells();
   window_.state.assign(window_.geometry.cell_count(), CellState::kFree);
-  window_.squared_cells.assign(window_.geometry.cell_count(), distance_.cut());
+  window_.squared.assign(window_.geometry.cell_count(), distance_.cut());
   first_.assign(window_.geometry.cell_count() + 1, 0);
 }
 
@@ -55,8 +55,8 @@ void ScanView::place(const Pose2& T_odom_base_then, const Pose2& T_odom_base_now
   sort_returns();
   // The window's edge is no wall: distances are taken a reach inside it only (see clearance_m).
   distance_.update(g.width_cells, g.height_cells, reinterpret_cast<const std::uint8_t*>(window_.state.data()),
-                   static_cast<std::uint8_t>(CellState::kFree), {0, 0, g.width_cells, g.height_cells},
-                   window_.squared_cells.data());
+                   static_cast<std::uint8_t>(CellState::kFree), nullptr, {0, 0, g.width_cells, g.height_cells},
+                   window_.squared.data());
 }
 
 void ScanView::sort_returns() {

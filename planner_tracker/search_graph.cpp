@@ -19,7 +19,7 @@ const SearchMove kSearchMove[kSearchMoves] = {
     {-2, -1, kKnight}, {-1, -2, kKnight},  {1, -2, kKnight},    {2, -1, kKnight}};
 
 ClearancePrice::ClearancePrice(const MapLayer& layer, double hard_m, double preferred_m, double price) {
-  const int cut = (layer.reach_cells + 1) * (layer.reach_cells + 1);
+  const int cut = layer.squared_cut();
   hard_squared_ = static_cast<std::int16_t>(std::min(layer.squared_for(hard_m), cut));
   factor_.assign(static_cast<std::size_t>(cut) + 1, 0);
   for (int d = hard_squared_; d <= cut; ++d) {

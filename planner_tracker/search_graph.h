@@ -15,10 +15,10 @@ class ClearancePrice {
   /// @param hard_m centre to obstacle, closed below; @param preferred_m dearer below, by up to `price`
   ClearancePrice(const MapLayer& layer, double hard_m, double preferred_m, double price);
 
-  std::uint32_t of(std::int16_t squared_cells) const {
-    return factor_[static_cast<std::size_t>(squared_cells)];
+  std::uint32_t of(std::int16_t squared) const {
+    return factor_[static_cast<std::size_t>(squared)];
   }
-  bool open(std::int16_t squared_cells) const { return squared_cells >= hard_squared_; }
+  bool open(std::int16_t squared) const { return squared >= hard_squared_; }
   std::int16_t hard_squared() const { return hard_squared_; }
 
  private:
@@ -52,7 +52,7 @@ class SearchGraph {
   int jx(std::size_t node) const { return static_cast<int>(node % static_cast<std::size_t>(width_)); }
   int jy(std::size_t node) const { return static_cast<int>(node / static_cast<std::size_t>(width_)); }
   std::size_t cell(int jx, int jy) const { return layer_->geometry.index(jx * stride_, jy * stride_); }
-  std::int16_t squared(int jx, int jy) const { return layer_->squared_cells[cell(jx, jy)]; }
+  std::int16_t squared(int jx, int jy) const { return layer_->squared[cell(jx, jy)]; }
   const MapLayer& layer() const { return *layer_; }
   const ClearancePrice& price() const { return *price_; }
 
@@ -61,7 +61,7 @@ class SearchGraph {
   std::uint32_t move_cost_mm(int jx, int jy, std::uint32_t from_factor, int move) const {
     const int tx = jx + kSearchMove[move].dx, ty = jy + kSearchMove[move].dy;
     if (tx < 0 || ty < 0 || tx >= width_ || ty >= height_) return 0;
-    const std::int16_t* d = layer_->squared_cells.data() + cell(jx, jy);
+    const std::int16_t* d = layer_->squared.data() + cell(jx, jy);
     const std::uint32_t to_factor = price_->of(d[end_[move]]);
     if (to_factor == 0) return 0;
     for (int i = 0; i < between_count_[move]; ++i) {

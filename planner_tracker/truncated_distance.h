@@ -19,28 +19,48 @@ struct CellWindow {
   void include(int ix, int iy);
 };
 
-/// Exact squared Euclidean distance in cells to the nearest blocked cell, cut at (reach + 1)^2. The same
-/// numbers as core's euclidean_distance_m() as far as it reaches, but of a window of a larger grid, on 16-bit
-/// integers that the compiler vectorises: 14 ms instead of 82 ms for 3.7 million cells at a reach of 14
-/// (benchmark_planner).
+/// Where in a blocked cell its surface is, from the cell's middle, in TruncatedDistance's units; at most half a cell.
+struct SurfaceOffset {
+  std::int8_t x = 0, y = 0;
+  bool operator==(const SurfaceOffset& o) const { return x == o.x && y == o.y; }
+  bool operator!=(const SurfaceOffset& o) const { return !(*this == o); }
+};
+
+/// Squared Euclidean distance from a cell's middle to the surface in the nearest blocked cell, cut at a reach. Exact where the surfaces
+/// are in the cells' middles: the same numbers as core's euclidean_distance_m(), but of a window of a larger grid, on
+/// 16-bit integers that the compiler vectorises: 14 ms instead of 82 ms for 3.7 million cells at a reach of 14
+/// (benchmark_planner). With surfaces elsewhere in their cells, of each column of cells the one counts that is nearest along the
+/// column: never too near, exact along walls, and among lone surfaces too far by a cell at most.
 class TruncatedDistance {
  public:
-  explicit TruncatedDistance(int reach_cells);
+  /// @param units_per_cell  of distances and offsets; (reach + 1) times this is at most 127
+  explicit TruncatedDistance(int reach_cells, int units_per_cell = 1);
+  /// The finest units for a reach, 8 to the cell at most.
+  static int finest_units(int reach_cells);
 
   int reach_cells() const { return reach_; }
+  int units_per_cell() const { return units_; }
+  /// What is farther has this value, the square of a cell more than the reach.
   std::int16_t cut() const { return cut_; }
 
   /// Recomputes `squared` in the window, which is clipped to the grid. What lies off the grid counts as
   /// blocked.
   /// @param cells [width x height], row-major; every value but `open` is blocked
-  void update(int width, int height, const std::uint8_t* cells, std::uint8_t open, const CellWindow& window,
-              std::int16_t* squared);
+  /// @param surface  of the blocked cells, the same shape; null: their middles
+  /// @param squared  [units^2], 0 in blocked cells
+  void update(int width, int height, const std::uint8_t* cells, std::uint8_t open, const SurfaceOffset* surface,
+              const CellWindow& window, std::int16_t* squared);
 
  private:
-  int reach_;
+  struct Sweep;
+  void nearest_along_columns(const Sweep& sweep);
+  void nearest_along_rows(const Sweep& sweep, std::int16_t* squared);
+
+  int reach_, units_;
   std::int16_t cut_;
-  std::vector<std::int16_t> rows_;  ///< scratch: vertical distances, then their squares
-  std::vector<std::int16_t> run_;   ///< scratch: the sweep's current row
+  std::vector<std::int16_t> rows_;   ///< scratch, per cell: distance to the nearest surface of its column, then its square
+  std::vector<std::int16_t> aside_;  ///< scratch, per cell: how far to the right of the column's middle that surface is
+  std::vector<std::int16_t> run_, run_aside_;  ///< scratch: the sweep's current row
 };
 
 }  // namespace knav

@@ -1,9 +1,46 @@
 #include "tsdf_local_mapper/local_map.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
+#include <limits>
+
+#include "core/surface_code.h"
 
 namespace knav {
+namespace {
+
+/// How far beyond the middle of a surface's cell F changes its sign, going on from a free cell beside it, in cells; negative before it.
+/// NaN where it does not near it: along the surface.
+double crossing_beyond(const TsdfGrid& grid, int ix, int iy, int step_x, int step_y) {
+  const int free = grid.value(ix - step_x, iy - step_y), here = grid.value(ix, iy), behind = grid.value(ix + step_x, iy + step_y);
+  if (here > 0 && behind != TsdfGrid::kUnknown && behind < 0) return static_cast<double>(here) / (here - behind);
+  return free > here ? static_cast<double>(here) / (free - here) : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Writes into the free cells beside the surfaces where these are: along the axis along which F changes most.
+void write_surface_codes(const TsdfGrid& grid, int low_x, int low_y, OccupancyGrid* map) {
+  constexpr double kSlack = 0.1;  // of noise, about the cell's edges
+  const GridGeometry& g = map->geometry;
+  for (int y = 1; y + 1 < g.height_cells; ++y) {
+    for (int x = 1; x + 1 < g.width_cells; ++x) {
+      std::int8_t& free = map->value[g.index(x, y)];
+      if (free < 0 || free == 100) continue;
+      int steepest = 0;
+      for (int side = 0; side < 4; ++side) {
+        const int step_x = side == 0 ? 1 : side == 1 ? -1 : 0, step_y = side == 2 ? 1 : side == 3 ? -1 : 0;
+        if (map->value[g.index(x + step_x, y + step_y)] != 100) continue;
+        const int fall = grid.value(low_x + x, low_y + y) - grid.value(low_x + x + step_x, low_y + y + step_y);
+        const double beyond = crossing_beyond(grid, low_x + x + step_x, low_y + y + step_y, step_x, step_y);
+        if (fall <= steepest || !(std::abs(beyond) < 0.5 + kSlack)) continue;
+        steepest = fall;
+        free = SurfaceCode::of(step_y == 0, 1.0 + beyond);
+      }
+    }
+  }
+}
+
+}  // namespace
 
 void extract_occupancy(const TsdfGrid& grid, double center_x_m, double center_y_m, double size_m,
                        const SurfaceRule& rule, OccupancyGrid* map) {
@@ -37,6 +74,7 @@ void extract_occupancy(const TsdfGrid& grid, double center_x_m, double center_y_
       }
     }
   }
+  write_surface_codes(grid, low_x, low_y, map);
 }
 
 }  // namespace knav

@@ -1,12 +1,14 @@
 #!/usr/bin/python3
 """A stack as small as can be: a move_base action that drives straight at its goal on the true pose, and says by TF that
 its map is the world. Private parameters: abort_goal and die_at_goal (counted from 1), halt (a process
-that it stops before it dies), commands (false: never publishes on cmd_vel), log (a file that receives a line of JSON for
+that it stops before it dies), mute_s (for so long after a goal's end the action says nothing, and then first what its status is), commands (false: never publishes on cmd_vel), log (a file that receives a line of JSON for
 every goal)."""
 import json
 import math
 import os
 import signal
+import threading
+import time
 
 import actionlib
 import rospy
@@ -58,7 +60,24 @@ class StandIn:
         self.server = Server("move_base", MoveBaseAction, self.drive, False)
         self.server.die_at_goal = rospy.get_param("~die_at_goal", 0)
         self.server.halt = rospy.get_param("~halt", 0)
+        mute_s = rospy.get_param("~mute_s", 0.0)
+        if mute_s > 0.0:
+            self.mute_ends_of_goals(mute_s)
         self.server.start()
+
+    def mute_ends_of_goals(self, mute_s):
+        actions = self.server.action_server
+        publish_status, publish_result = actions.publish_status, actions.publish_result
+
+        def speak_later(*result):
+            actions.publish_status = lambda: None
+            rospy.sleep(mute_s)
+            actions.publish_status = publish_status
+            publish_status()
+            time.sleep(0.3)
+            publish_result(*result)
+
+        actions.publish_result = lambda *result: threading.Thread(target=speak_later, args=result).start()
 
     def on_sensor(self, message, topic):
         self.sensors[topic] = message.header.frame_id

@@ -185,6 +185,15 @@ class ExternalBenchmark(unittest.TestCase):
         self.assertEqual([leg["reached"] for leg in legs], [True, False, True], text)
         self.assertIn("went away", legs[1]["reason"])
 
+    def test_a_result_that_comes_after_its_goal_has_left_the_status_list_is_heard(self):
+        # A server lists what has ended for 5 s by the clock, which a busy machine lets pass unheard when the clock is fast.
+        with StandIn(abort_goal=2, mute_s=6.0):
+            code, text = self.run_benchmark()
+        self.assertEqual(code, 0, text)
+        legs = self.legs()
+        self.assertEqual([leg["reached"] for leg in legs], [True, False, True], text)
+        self.assertEqual(legs[1]["reason"], "the floor is wet")
+
     def test_an_interrupt_leaves_nothing_half_written(self):
         log = self.folder / "interrupted.log"
         with StandIn(log=log):

@@ -189,6 +189,9 @@ TEST(GoalScore, SpeedIsOfReachedGoalsReversalsOfAllAndKidnapsAreCountedApart) {
   run.goals.back().failure_code = static_cast<int>(FailureCode::kNoPath);
   run.goals.push_back(result_of(Expected::kReached, true, 100.0, 30.0));
   run.goals.back().goal.kidnap = true;
+  run.goals.back().carried_off = true;
+  run.goals.back().recovery = {2.0, 38.0, 0.5};
+  run.goals.back().localization = {100.0, 60.0, 10.0, 30.0, 0.0, 0.5};
   const GoalScore s = score({run});
   EXPECT_EQ(s.goals, 4);
   EXPECT_EQ(s.reachable, 2);
@@ -198,10 +201,41 @@ TEST(GoalScore, SpeedIsOfReachedGoalsReversalsOfAllAndKidnapsAreCountedApart) {
   EXPECT_EQ(s.right_in_time, 0) << "70 s";
   EXPECT_EQ(s.kidnapped, 1);
   EXPECT_EQ(s.found_again, 1);
+  EXPECT_EQ(s.noticed, 1);
+  EXPECT_EQ(s.localized_again, 1);
+  EXPECT_DOUBLE_EQ(s.localization.ok_wrong_s, 0.5);
   EXPECT_DOUBLE_EQ(s.speed_mps, 0.5);
   EXPECT_DOUBLE_EQ(s.reversals_per_20s, 20.0 * 4 / 80.0);
   EXPECT_EQ(to_json(goal_run_from_json(to_json(run), "run_01.json")), to_json(run));
   EXPECT_THAT(goal_report_markdown({run}, {"a test"}), HasSubstr("1 of 2 (50.0 %)"));
+}
+
+TEST(KidnapWatch, NoticedIsNotOkInTimeAndRightIsOkAndNear) {
+  KidnapWatch watch(100.0);
+  const auto say = [&](double stamp_s, LocalizationVerdict verdict, double error_m) {
+    Moment m;
+    m.stamp_s = stamp_s;
+    m.dt_s = 0.1;
+    m.has_pose = true;
+    m.verdict = verdict;
+    m.error_m = error_m;
+    watch.add(m);
+  };
+  say(101.0, LocalizationVerdict::kOk, 9.0);
+  EXPECT_EQ(watch.recovery().ok_wrong_s, 0.0) << "forgiven for 5 s";
+  say(106.0, LocalizationVerdict::kOk, 9.0);
+  EXPECT_DOUBLE_EQ(watch.recovery().ok_wrong_s, 0.1);
+  say(107.0, LocalizationVerdict::kUncertain, 9.0);
+  EXPECT_FALSE(watch.recovery().noticed()) << "after 7 s";
+  EXPECT_DOUBLE_EQ(watch.recovery().noticed_s, 7.0);
+  say(108.0, LocalizationVerdict::kUncertain, 0.1);
+  EXPECT_FALSE(watch.recovery().right()) << "near, but it does not say so";
+  say(109.0, LocalizationVerdict::kOk, 0.31);
+  EXPECT_FALSE(watch.recovery().right());
+  say(141.0, LocalizationVerdict::kOk, 0.1);
+  EXPECT_FALSE(watch.recovery().right()) << "too late";
+  say(139.0, LocalizationVerdict::kOk, 0.1);
+  EXPECT_DOUBLE_EQ(watch.recovery().right_s, 39.0);
 }
 
 TEST(GoalSession, DrivesGoalsInASmallRoomAndASecondSessionDrivesNothingAgain) {

@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "localizer_benchmark/image_world.h"
 #include "localizer_benchmark/measures.h"
-#include "localizer_benchmark/truth_map.h"
+#include "brin_benchmark/truth_map.h"
 #include "localizer_benchmark/unique_places.h"
 
 namespace knav {

@@ -55,7 +55,7 @@ void ClearanceOfWholeMap(benchmark::State& state) {
     if (core)
       benchmark::DoNotOptimize(euclidean_distance_m(grid.geometry, blocked));
     else {
-      truncated.update(grid.geometry.width_cells, grid.geometry.height_cells, blocked.data(), 0,
+      truncated.update(grid.geometry.width_cells, grid.geometry.height_cells, blocked.data(), 0, nullptr,
                        {0, 0, grid.geometry.width_cells, grid.geometry.height_cells}, squared.data());
       benchmark::DoNotOptimize(squared.data());
     }

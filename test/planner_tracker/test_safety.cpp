@@ -117,28 +117,63 @@ TEST(Safety, AClockThatJumpsBackEndsTheGoal) {
   EXPECT_EQ(world.run(60.0).activity, Activity::kReached);
 }
 
-TEST(Recovery, ALostRobotLooksRoundWandersAndGoesOnWhenFound) {
+TEST(Recovery, ALostRobotLooksRoundWandersFartherEachTimeAndGoesOnWhenFound) {
   const OccupancyGrid grid = room(8.0, 6.0);
-  ToyWorld world(grid, grid, {4.0, 3.0, 0.0});
+  PlannerTrackerConfig config;
+  config.recovery.wander_radius_m = 0.8;
+  ToyWorld world(grid, grid, {4.0, 3.0, 0.0}, config);
   world.planner.set_goal({7.0, 5.0, 0.0});
   world.run(2.0);
   world.localization = LocalizationState::kLost;
-  bool turned = false, wandered = false;
+  bool turned = false;
   const Pose2 there = world.T_map_base;
-  double farthest = 0.0;
-  for (int i = 0; i < 1400; ++i) {
+  int rounds = 0;
+  double farthest = 0.0, most_beyond = 0.0;
+  Activity before = Activity::kDriving;
+  for (int i = 0; i < 1800; ++i) {
     const Command command = world.step();
     ASSERT_FALSE(command.finished);
     turned |= command.activity == Activity::kLostTurning;
-    wandered |= command.activity == Activity::kLostWandering && command.v_mps > 0.05;
+    if (command.activity == Activity::kLostWandering && before == Activity::kLostTurning) ++rounds;
+    before = command.activity;
     farthest = std::max(farthest, world.distance_to(there));
+    most_beyond = std::max(most_beyond, world.distance_to(there) - 0.8 * std::max(1, rounds));
   }
   EXPECT_TRUE(turned);
-  EXPECT_TRUE(wandered);
-  EXPECT_LT(farthest, 3.5);
+  EXPECT_GE(rounds, 3);
+  EXPECT_GT(farthest, 1.0);
+  EXPECT_LT(most_beyond, 0.05) << "brakes at the end of a move";
   world.localization = LocalizationState::kOk;
   EXPECT_EQ(world.run(60.0).activity, Activity::kReached);
   EXPECT_EQ(world.collisions, 0);
+}
+
+TEST(Recovery, CarriedOffItHasTheTimeThatTheWayFromThereTakes) {
+  const OccupancyGrid grid = room(70.0, 4.0);
+  ToyWorld world(grid, grid, {1.0, 2.0, 0.0});
+  world.planner.set_goal({4.0, 2.0, 0.0});  // 3 m: 85 s
+  world.run(3.0);
+  const Pose2 T_odom_base = world.T_map_odom.inverse() * world.T_map_base;
+  world.T_map_base = {68.0, 2.0, kPi};
+  world.T_map_odom = world.T_map_base * T_odom_base.inverse();
+  const double carried_off_s = world.now_s;
+  const Command command = world.run(300.0);
+  EXPECT_EQ(command.activity, Activity::kReached) << world.planner.failure().reason;
+  EXPECT_GT(world.now_s - carried_off_s, 95.0) << "or this tests nothing";
+}
+
+TEST(Recovery, ALocalizerThatJumpsForEverDoesNotKeepAGoalForEver) {
+  const OccupancyGrid grid = room(70.0, 4.0);
+  ToyWorld world(grid, grid, {1.0, 2.0, 0.0});
+  world.planner.set_goal({4.0, 2.0, 0.0});
+  Command command;
+  for (int k = 0; k < 150 && !command.finished; ++k) {
+    command = world.run(4.0);
+    const Pose2 T_odom_base = world.T_map_odom.inverse() * world.T_map_base;
+    world.T_map_base = {k % 2 == 0 ? 68.0 : 40.0, 2.0, kPi};
+    world.T_map_odom = world.T_map_base * T_odom_base.inverse();
+  }
+  EXPECT_EQ(command.activity, Activity::kFailed);
 }
 
 TEST(Recovery, NeverFoundFailsAsLost) {

@@ -1,4 +1,4 @@
-#include "localizer_benchmark/truth_map.h"
+#include "brin_benchmark/truth_map.h"
 
 #include <algorithm>
 #include <cmath>
@@ -88,6 +88,18 @@ DistanceMap truth_map(const WorldConfig& world) {
       map.distance_m[i] = static_cast<float>(distance_m);
     }
   }
+  return map;
+}
+
+MapDirectory truth_map_directory(const WorldConfig& world) {
+  MapDirectory map;
+  map.distance = truth_map(world);
+  map.occupancy.geometry = map.keepout.geometry = map.distance.geometry;
+  map.keepout.value.assign(map.distance.distance_m.size(), 0);
+  for (const float distance_m : map.distance.distance_m) {
+    map.occupancy.value.push_back(std::isnan(distance_m) ? -1 : (distance_m < 0.5 * kCell_m ? 100 : 0));
+  }
+  map.about["made_from"] = "the walls and furniture of " + world.name;
   return map;
 }
 
