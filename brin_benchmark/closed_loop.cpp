@@ -79,9 +79,9 @@ bool ClosedLoop::place_near(const Pose2& T_world_robot, const Pose2& T_map_robot
   });
 }
 
-bool ClosedLoop::kidnap(const Pose2& T_world_robot) {
+bool ClosedLoop::kidnap(const Pose2& T_world_robot, double room_m) {
   try {
-    simulator_.set_pose(T_world_robot);
+    simulator_.set_pose(T_world_robot, room_m);
   } catch (const UserError&) {
     return false;  // something stands there
   }

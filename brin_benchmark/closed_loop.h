@@ -35,8 +35,8 @@ class ClosedLoop {
   /// Sets the robot down, says so, and lets it look for a second; beside the pose if something stands on it. False if there
   /// is no room within 2 m.
   bool place_near(const Pose2& T_world_robot, const Pose2& T_map_robot);
-  /// Carries the robot elsewhere and tells nobody. False if something stands there.
-  bool kidnap(const Pose2& T_world_robot);
+  /// Carries the robot elsewhere and tells nobody. False if something stands there, or nearer than `room_m` to it.
+  bool kidnap(const Pose2& T_world_robot, double room_m = 0.0);
 
   /// Of the robot's own work (all but the simulation), a frame.
   double frame_cost_ms() const { return frames_ > 0 ? 1e3 * stack_s_ / static_cast<double>(frames_) : 0.0; }

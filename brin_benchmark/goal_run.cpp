@@ -9,6 +9,7 @@
 
 #include "brin_benchmark/closed_loop.h"
 #include "brin_benchmark/direction_watch.h"
+#include "brin_benchmark/set_down.h"
 #include "core/error.h"
 
 namespace knav {
@@ -20,6 +21,7 @@ constexpr double kUnreachable_s = 150.0;  ///< long enough to see when it gives 
 constexpr double kAfter_s = 1.0;
 constexpr double kWatch_s = 0.1;
 constexpr double kCarriedOffAfter_m = 2.0;  ///< or half the way
+constexpr double kSetDownRoom_m = 0.15;
 constexpr double kStands_mps = 0.02, kStands_radps = 0.05;
 
 class GoalDriver {
@@ -57,8 +59,8 @@ class GoalDriver {
       }
       const double driven_m = loop_.simulator().distance_driven_m() - start_m;
       if (goal.kidnap && !result_.carried_off && driven_m > std::min(kCarriedOffAfter_m, 0.5 * straight_m)) {
-        // Somebody may stand there: then a little later.
-        result_.carried_off = loop_.kidnap(goal.T_world_kidnap);
+        // Something may stand there: then beside it, as a person would.
+        result_.carried_off = set_down_near([&](const Pose2& aside) { return loop_.kidnap(goal.T_world_kidnap * aside, kSetDownRoom_m); });
         if (!result_.carried_off) continue;
         directions_.start(loop_.simulator().T_world_base());
         watch_.emplace(loop_.now_s());

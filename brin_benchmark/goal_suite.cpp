@@ -186,15 +186,14 @@ class GoalMaker {
     return goal_at("floor", best);
   }
 
+  /// Carried anywhere, and the goal a way from there: else the robot would drive across all of a large building after each.
   SuiteGoal kidnapped() {
+    Point2 set_down = floor_[pick(floor_.size())];
+    for (int attempt = 0; attempt < kTries && away_m(set_down, at_) < kShortestKidnap_m; ++attempt) set_down = floor_[pick(floor_.size())];
+    at_ = set_down;
     SuiteGoal goal = on_the_floor();
     goal.kidnap = true;
-    for (int attempt = 0; attempt < 20 * kTries; ++attempt) {
-      const Point2 p = floor_[pick(floor_.size())];
-      if (away_m(p, {goal.T_world_goal.x_m, goal.T_world_goal.y_m}) < kShortestKidnap_m || away_m(p, at_) < kShortestKidnap_m) continue;
-      goal.T_world_kidnap = {p.x_m, p.y_m, random_.uniform(-kPi, kPi)};
-      break;
-    }
+    goal.T_world_kidnap = {set_down.x_m, set_down.y_m, random_.uniform(-kPi, kPi)};
     return goal;
   }
 

@@ -310,9 +310,9 @@ void Simulator::cast_scan(const FrameRequest& request, const Pose2& T_world_sens
   }
 }
 
-void Simulator::set_pose(const Pose2& T_world_base) {
+void Simulator::set_pose(const Pose2& T_world_base, double room_m) {
   if (!is_finite(T_world_base)) throw UserError("set_pose: the pose is not finite.");
-  if (gap_m(T_world_base) < 0.0) {
+  if (gap_m(T_world_base) < room_m) {
     throw UserError(fmt::format("set_pose: the robot does not fit at [{:.2f}, {:.2f}] in world {}.",
                                 T_world_base.x_m, T_world_base.y_m, world_.file));
   }

@@ -94,8 +94,9 @@ class Simulator {
   float range_ahead_m(const FrameRequest& request);
   Pose2 T_base_laser() const;
 
-  /// Puts the robot elsewhere (kidnaps it): odometry does not notice. UserError if something stands there.
-  void set_pose(const Pose2& T_world_base);
+  /// Puts the robot elsewhere (kidnaps it): odometry does not notice. UserError if something stands there, or nearer to its rim than
+  /// `room_m`.
+  void set_pose(const Pose2& T_world_base, double room_m = 0.0);
   /// Odometry goes on from there: a robot that comes from another building.
   void set_odometry(const Pose2& T_odom_base) { robot_.set_odometry(T_odom_base); }
   /// Robot, people and counters as at the start; time and odometry go on.

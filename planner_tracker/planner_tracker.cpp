@@ -207,7 +207,8 @@ Command PlannerTracker::State::step(double now_s, const RobotState& robot) {
     goal_start_s = now_s;
     goal_allowed_s = 1e9;
     relocalized = false;
-    jumps = 0;
+    jumps = corrections = 0;
+    correct_until_s = -1.0;
     T_map_odom = robot.T_map_base * robot.T_odom_base.inverse();
     watch.start(now_s);
   }

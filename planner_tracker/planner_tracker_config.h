@@ -182,6 +182,7 @@ struct PlannerTrackerConfig {
   double xy_goal_tolerance = 0.05;
   double yaw_goal_tolerance = 0.08;
   bool latch_xy_goal_tolerance = true;
+  int goal_corrections = 1;
   double max_vel_x = 0.6;
   double min_vel_x = -0.10;
   double max_vel_theta = 1.2;
@@ -218,7 +219,9 @@ struct PlannerTrackerConfig {
     v.number("xy_goal_tolerance", xy_goal_tolerance, 0.01, 2, "m", "How near the goal is there.");
     v.number("yaw_goal_tolerance", yaw_goal_tolerance, 0.01, 3.2, "rad", "How well aligned with it.");
     v.flag("latch_xy_goal_tolerance", latch_xy_goal_tolerance,
-           "Once within xy_goal_tolerance, only turn, whatever the localizer says next.");
+           "Once within xy_goal_tolerance, only turn, whatever the localizer says next ...");
+    v.integer("goal_corrections", goal_corrections, 0, 10, "",
+              "... until it faces the goal's heading: farther off than xy_goal_tolerance then, it drives up to it anew, so often at most.");
     v.number("max_vel_x", max_vel_x, 0.05, 3, "m/s", "Fastest.");
     v.number("min_vel_x", min_vel_x, -1, 0, "m/s",
              "Fastest backwards, used only over a goal just overshot and where scan_360 shows free space; 0 "

@@ -75,6 +75,8 @@ struct PlannerTracker::State {
   bool has_goal = false, ending = false;
   Pose2 goal;
   bool latched = false, goal_started = false;
+  int corrections = 0;            ///< of the place, after turning at the goal
+  double correct_until_s = -1.0;
   double goal_start_s = 0.0, goal_allowed_s = 0.0;
   bool relocalized = false;  ///< the robot turned out to be elsewhere: what it may take begins anew from there
   int jumps = 0;

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kFailedPlanWait_s = 1.0;  ///< a search that finds nothing is the dearest
 constexpr double kGotOn_m = 0.05, kGotOn_rad = 0.2;
+constexpr double kCorrectFor_s = 5.0;  ///< a goal driven up to anew must be come nearer to, or the robot would not stir
 constexpr double kAllowance_s = 60.0;
 constexpr double kOpenEnough_m = 1.5;  ///< for a step aside
 constexpr double kFloorSeenFrom_m = 1.2;  ///< nearer, a level Kinect at 0.5 m does not see the floor
@@ -68,7 +69,7 @@ bool PlannerTracker::State::arrived(const RobotState& robot) {
   if (!latched) {
     // Not at the tolerance's rim, if driving on still brings it nearer.
     const bool nearest =
-        distance < 0.4 * config.xy_goal_tolerance || T_base_goal.x_m < 0.3 * distance || input.v_mps < 0.03;
+        distance < 0.4 * config.xy_goal_tolerance || T_base_goal.x_m < 0.3 * distance || (input.v_mps < 0.03 && last_step_s > correct_until_s);
     latched = distance < config.xy_goal_tolerance && nearest;
   } else if (!config.latch_xy_goal_tolerance && distance > config.xy_goal_tolerance) {
     latched = false;
@@ -80,6 +81,14 @@ bool PlannerTracker::State::arrived(const RobotState& robot) {
   const bool still = std::abs(input.v_mps) < 0.01 && std::abs(robot.v_mps) < 0.05 &&
                      std::abs(input.w_radps) <= config.acc_lim_theta * input.dt_s + 1e-9;
   if (std::abs(error) < config.yaw_goal_tolerance && still) {
+    if (distance > config.xy_goal_tolerance && corrections < config.goal_corrections) {
+      // While it turned it saw more, and the localizer has it elsewhere now.
+      ++corrections;
+      latched = false;
+      correct_until_s = last_step_s + kCorrectFor_s;
+      next_plan_s = -1.0;
+      return false;
+    }
     end_goal();
     command = {};
     command.activity = Activity::kReached;

@@ -114,6 +114,29 @@ TEST(Goal, ReachedUnderANoisyPoseWithoutDancing) {
   }
 }
 
+TEST(Goal, WhatTheLocalizerCorrectsWhileTheRobotTurnsAtItIsMadeGood) {
+  const OccupancyGrid grid = room(8.0, 6.0);
+  for (const int corrections : {0, 1}) {
+    PlannerTrackerConfig config;
+    config.goal_corrections = corrections;
+    ToyWorld world(grid, grid, {2.0, 3.0, 0.0}, config);
+    const Pose2 goal{5.0, 3.0, 0.5 * kPi};
+    world.planner.set_goal(goal);
+    Command command;
+    while (!command.finished && command.activity != Activity::kAligning) command = world.step();
+    const Pose2 T_odom_base = world.T_map_odom.inverse() * world.T_map_base;
+    world.T_map_base.x_m += 0.09;
+    world.T_map_odom = world.T_map_base * T_odom_base.inverse();
+    EXPECT_EQ(world.run(60.0).activity, Activity::kReached) << corrections;
+    if (corrections == 0) {
+      EXPECT_GT(world.distance_to(goal), 0.06);
+    } else {
+      EXPECT_LT(world.distance_to(goal), 0.05);
+    }
+    EXPECT_LT(std::abs(normalize_angle_rad(world.T_map_base.yaw_rad - goal.yaw_rad)), 0.1);
+  }
+}
+
 TEST(Refused, GoalsThatCannotBe) {
   OccupancyGrid grid = two_rooms();
   fill(&grid, 1.0, 4.0, 2.0, 5.0, -1);
