@@ -277,6 +277,7 @@ class GoalMaker {
     layout.robot_radius_m = config_.robot_radius_m;
     layout.people = config_.people;
     layout.closed_door = sealed.door;
+    for (const auto& [name, pose] : world_.places) layout.keep_free.push_back({pose.x_m, pose.y_m});
     std::map<std::string, Pose2> places;
     std::vector<std::vector<Point2>> legs;
     Point2 at{world_.spawn.x_m, world_.spawn.y_m};

@@ -19,6 +19,7 @@ struct LayoutConfig {
   double moved_share = 0.3;     ///< of the movable furniture
   int people = 0;               ///< in every run; 0 = 3 to 6, and 10 in a crowd
   std::string closed_door;      ///< closed in every run, whatever it cuts off
+  std::vector<Point2> keep_free;  ///< nothing is put on these, whether they can be reached or not
 };
 
 /// A benchmark laid out in a building: where the robot is sent, how it is mapped, and what changes from run

@@ -112,8 +112,10 @@ class RunMaker {
       for (const Solid& b : added_) {
         if (touches(a, b) || touches(b, a)) return true;
       }
-      for (const Point2& p : must_reach_) {
-        if (footprint_distance_m(a, p) < kFreePlace_m) return true;
+      for (const auto* points : {&must_reach_, &config_.keep_free}) {
+        for (const Point2& p : *points) {
+          if (footprint_distance_m(a, p) < kFreePlace_m) return true;
+        }
       }
     }
     return false;

@@ -107,6 +107,24 @@ TEST(Goals, ReachableOnesCanBeReachedInTheChangedBuildingAndOthersCannot) {
   EXPECT_EQ(to_json(suite_from_json(to_json(suite), "suite.json")), to_json(suite));
 }
 
+TEST(Goals, NothingIsPutOnThePlacesOfTheWorldReachableOrNot) {
+  const std::string text = std::string(kHouse) + "places:\n  near_table: [3, 3.3, 0]\n  beside_table: [4, 4, 0]\n  other_room: [10, 3, 0]\n";
+  const WorldConfig world = parse_world(text, "house.yaml");
+  const MapDirectory map = true_map(world);
+  const WorldInMap world_in_map(world, map, world.spawn);
+  const std::string house = testing::TempDir() + "goals_places.yaml";
+  std::ofstream(house) << text;
+  BenchmarkProtocol protocol;
+  protocol.file = house;
+  GoalSuiteConfig config = small_suite();
+  config.runs = 3;
+  for (config.seed = 1; config.seed <= 12; ++config.seed) {
+    for (const SuiteRun& run : draw_goals(world, map, world_in_map, config)) {
+      EXPECT_NO_THROW(changed_world(house, protocol, {run.name, run.changes})) << config.seed << ", " << run.name;
+    }
+  }
+}
+
 TEST(Goals, GlassAndStairsArePaintedIntoTheKeepoutMask) {
   const WorldConfig world = parse_world(kHouse, "house.yaml");
   MapDirectory map = true_map(world);
