@@ -15,6 +15,7 @@ class MovingCells {
  public:
   static constexpr double kFresh_s = 1.0;  ///< a cell counts for so long
   static constexpr int kShift_cells = 3;   ///< what lies so near to something that stood there before is that
+  static constexpr double kTrail_s = 15.0;
   static constexpr std::size_t kFewest = 4;  ///< cells; fewer are noise
 
   void reset(const MapLayer& layer);
@@ -23,15 +24,19 @@ class MovingCells {
 
   /// In the map.
   const std::vector<Point2>& points() const { return points_; }
+  /// Where somebody was on his way: occupied for a moment within the last kTrail_s, free again now, and nothing stands beside it. A thing
+  /// that comes into view leaves no trail, though its surface is at first seen some decimetres off.
+  const std::vector<Point2>& trail() const { return trail_; }
 
  private:
+  bool is_trail(const MapLayer& global, const MapLayer& combined, int ix, int iy, float now) const;
   bool stood_near(const MapLayer& global, int ix, int iy, double now_s) const;
 
   GridGeometry geometry_;
   // Per cell, seconds; 0 = never.
   std::vector<float> occupied_from_s_, occupied_to_s_;
   double begin_s_ = -1.0;  ///< stamps count from here: a float holds the milliseconds of a day, not of an epoch
-  std::vector<Point2> points_;
+  std::vector<Point2> points_, trail_;
 };
 
 }  // namespace knav

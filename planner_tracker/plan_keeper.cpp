@@ -12,7 +12,8 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kOffPath_m = 0.5;
 constexpr double kBeginning_m = 0.5;  ///< of a path, for its direction
 constexpr double kUnhurried = 1.5;  ///< times as long as at full speed
-constexpr double kMovesThere_m = 1.0;  ///< of where the way is closed
+constexpr double kMovesThere_m = 1.0;   ///< of where the way is closed
+constexpr double kWalkedThere_m = 1.5;  ///< who closes it has walked past so near to there
 constexpr double kWider_m = 0.05;      ///< a way once found closed must be wider by this on either side to turn back for
 
 }  // namespace
@@ -59,7 +60,7 @@ void PlanKeeper::let_walk_on(CombinedMap& map, double now_s) {
   left_to_somebody_.erase(std::remove_if(left_to_somebody_.begin(), left_to_somebody_.end(), gone), left_to_somebody_.end());
 }
 
-bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& moving) {
+bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& trail) {
   const bool first = held_since_s_ < 0.0;
   if (first) {
     held_ = path_;
@@ -85,8 +86,8 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
     const double to_see_m = to_see.length_m();
     to_see_s_ = 2.0 * to_see_m < detour_m ? kUnhurried * to_see_m / config_.max_vel_x : 0.0;
   }
-  const auto there = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kMovesThere_m; };
-  held_for_somebody_ = held_for_somebody_ || std::any_of(moving.begin(), moving.end(), there);
+  const auto there = [&](const Point2& p) { return std::hypot(p.x_m - at_.x_m, p.y_m - at_.y_m) < kWalkedThere_m; };
+  held_for_somebody_ = held_for_somebody_ || std::any_of(trail.begin(), trail.end(), there);
   const double worth_s = held_for_somebody_ ? config_.planning.hold_share * detour_m / config_.max_vel_x : 0.0;
   if (now_s - held_since_s_ > to_see_s_ + std::max(config_.planning.hold_s, worth_s)) {
     if (held_for_somebody_) {
@@ -102,7 +103,7 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
 }
 
 PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robot, const Point2& goal, double now_s,
-                                       const std::vector<Point2>& moving) {
+                                       const std::vector<Point2>& trail) {
   switched_ = false;
   strict_ = now_s < strict_until_s_;
   const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
@@ -150,7 +151,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
   if (result_.code == PlanCode::kOk) {
     const double old = path_kind_ == kind ? old_cost_m(layer, &path_, robot) : kInfinite;
     const bool was_to_goal = kind == Outcome::kToGoal && (holding() || (path_kind_ == kind && !path_.empty()));
-    if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s, moving)) return Outcome::kToBlockage;
+    if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s, trail)) return Outcome::kToBlockage;
     held_since_s_ = -1.0;
     elsewhere_ = look_elsewhere_ = false;
     const bool same_end =

@@ -42,8 +42,8 @@ class PlanKeeper {
     seen_shut_.clear();
     left_to_somebody_.clear();
   }
-  /// @param moving  points of the map at which something moves, see MovingCells
-  Outcome replan(CombinedMap& map, const Pose2& robot, const Point2& goal, double now_s, const std::vector<Point2>& moving = {});
+  /// @param trail  points of the map at which somebody walked a moment ago, see MovingCells
+  Outcome replan(CombinedMap& map, const Pose2& robot, const Point2& goal, double now_s, const std::vector<Point2>& trail = {});
   /// True if the way that is closed was open a moment ago and is expected to be again: the outcome is kToBlockage, though there
   /// is a way round.
   bool holding() const { return held_since_s_ >= 0.0; }
@@ -73,7 +73,7 @@ class PlanKeeper {
   /// True if the way round is to be left alone for now.
   /// Forgets who closed a way and has walked on since.
   void let_walk_on(CombinedMap& map, double now_s);
-  bool hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& moving);
+  bool hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& trail);
   void take(const std::vector<Point2>& path);
   /// There is no way now. Would there be one, where is it closed, and where can that be looked at from?
   Outcome go_and_look(CombinedMap& map, const Point2& robot, const Point2& goal, double now_s);
@@ -107,7 +107,7 @@ class PlanKeeper {
   double held_since_s_ = -1.0, to_see_s_ = 0.0;
   double strict_until_s_ = -1.0;  ///< see too_narrow()
   bool strict_ = false;
-  bool held_for_somebody_ = false;  ///< who moved there
+  bool held_for_somebody_ = false;  ///< who walked there
   struct LeftTo {
     Point2 at;
     double until_s;

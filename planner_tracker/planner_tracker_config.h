@@ -65,7 +65,7 @@ struct PlanningConfig {
              "A way that has just been closed is kept for this long, as whoever walks there walks on, if the way round is longer ...");
     v.number("hold_detour_m", hold_detour_m, 0, 100, "m", "... by more than this.");
     v.number("hold_share", hold_share, 0, 1, "",
-             "Where somebody is seen to move there it is kept longer, for this share of what the way round takes longer at full speed.");
+             "Where somebody walked a moment ago it is kept longer, for this share of what the way round takes longer at full speed.");
     v.number("controller_patience", controller_patience, 0.1, 60, "s",
              "The robot waits this long before something in its way, replanning, before it tries reactive "
              "avoidance.");
@@ -80,7 +80,7 @@ struct PlanningConfig {
              "What the local map showed occupied stays so for this long once it is off its edge, so that the robot does not "
              "turn to and fro between a way found closed and another.");
     v.number("somebody_memory_s", somebody_memory_s, 0, 3600, "s",
-             "The same where somebody was seen to move who closed the way: by then he has walked on, and the way back may be the shorter.");
+             "The same where somebody walked a moment before who closes the way: by then he has walked on, and the way back may be the shorter.");
     v.number("slowness", slowness, 1, 100, "",
              "The goal fails after 60 s plus this many times what its first plan takes at full speed.");
     v.number("goal_snap_m", goal_snap_m, 0, 5, "m",

@@ -113,7 +113,7 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
   next_plan_s = now_s + 1.0 / config.planner_frequency - 0.5 / config.controller_frequency;
   const bool first = goal_allowed_s > 1e8, allowance_due = first || relocalized;
   ++plans;
-  outcome = keeper.replan(map, robot.T_map_base, position(goal), now_s, moving.points());
+  outcome = keeper.replan(map, robot.T_map_base, position(goal), now_s, moving.trail());
   using Outcome = PlanKeeper::Outcome;
   // There was a way to this goal before: it is where the robot stands that has none.
   if (outcome == Outcome::kNoPath && !first) outcome = Outcome::kStartBlocked;

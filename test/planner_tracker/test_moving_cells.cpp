@@ -23,6 +23,7 @@ class Watched {
     cells_.update(map_.global(), map_.combined(), map_.local_window(), now_s);
     return cells_.points();
   }
+  const std::vector<Point2>& trail() const { return cells_.trail(); }
 
  private:
   CombinedMap map_;
@@ -51,6 +52,33 @@ TEST(MovingCells, ADeskThatStandsThereDoesNotMoveThoughItsContourShiftsWithTheLo
     if (t > 1.1) {
       EXPECT_TRUE(moving.empty()) << t;
     }
+  }
+}
+
+TEST(MovingCells, WhoWalksLeavesATrailForAWhileAndStandingSomewhereHeStillHasIt) {
+  Watched room;
+  for (int i = 0; i < 40; ++i) {
+    const double x = std::min(3.5, 1.0 + 0.08 * i);
+    room.see(100.0 + 0.1 * i, x - 0.2, 1.8, x + 0.2, 2.2);
+  }
+  ASSERT_FALSE(room.trail().empty());
+  double nearest = 9.0;
+  for (const Point2& p : room.trail()) {
+    nearest = std::min(nearest, std::hypot(p.x_m - 3.5, p.y_m - 2.0));
+    EXPECT_NEAR(p.y_m, 2.0, 0.3);
+  }
+  EXPECT_LT(nearest, 1.0);
+  for (int i = 0; i < 200; ++i) room.see(104.0 + 0.1 * i, 3.3, 1.8, 3.7, 2.2);
+  EXPECT_TRUE(room.trail().empty()) << "20 s later";
+}
+
+TEST(MovingCells, ABoxThatComesIntoViewLeavesNoTrailThoughItIsSeenDecimetresOffAtFirst) {
+  Watched room;
+  for (int i = 0; i < 10; ++i) room.see(100.0 + 0.1 * i, 0.0, 0.0, 0.0, 0.0);
+  for (int i = 0; i < 60; ++i) {
+    const double off = std::max(0.0, 0.25 - 0.01 * i);  // from 8 m the range errs by that
+    room.see(101.0 + 0.1 * i, 3.0 + off, 1.8, 3.4 + off, 2.2);
+    EXPECT_TRUE(room.trail().empty()) << i;
   }
 }
 
