@@ -178,7 +178,7 @@ struct FreshnessConfig {
 struct PlannerTrackerConfig {
   int seed = 1;
   double controller_frequency = 20.0;
-  double planner_frequency = 5.0;
+  double planner_frequency = 6.0;
   double xy_goal_tolerance = 0.05;
   double yaw_goal_tolerance = 0.08;
   bool latch_xy_goal_tolerance = true;
