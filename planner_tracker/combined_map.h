@@ -42,6 +42,8 @@ struct MapLayer {
   double clearance_m(double x_m, double y_m) const {
     return clearance_of(squared_at(geometry.cell_x(x_m), geometry.cell_y(y_m)));
   }
+  /// The same from the point itself, between the middles of the four cells round it.
+  double smooth_clearance_m(double x_m, double y_m) const;
   double clearance_of(std::int16_t squared) const {
     return squared <= 0 ? 0.0 : (std::sqrt(static_cast<double>(squared)) / units_per_cell - surface_cells) * geometry.resolution_m;
   }

@@ -1,5 +1,6 @@
 #include "planner_tracker/moving_cells.h"
 
+#include <cmath>
 #include <utility>
 
 namespace knav {
@@ -18,6 +19,7 @@ void MovingCells::reset(const MapLayer& layer) {
   const std::size_t cells = geometry_.cell_count();
   occupied_from_s_.assign(cells, kNever);
   occupied_to_s_.assign(cells, kNever);
+  occupied_near_s_.assign(cells, kNever);
   points_.clear();
   trail_.clear();
   begin_s_ = -1.0;
@@ -38,7 +40,7 @@ bool MovingCells::stood_near(const MapLayer& global, int ix, int iy, double now_
 
 bool MovingCells::is_trail(const MapLayer& global, const MapLayer& combined, int ix, int iy, float now) const {
   const std::size_t i = geometry_.index(ix, iy);
-  if (now - occupied_to_s_[i] > static_cast<float>(kTrail_s) || occupied_to_s_[i] - occupied_from_s_[i] > kPassed_s || global.state[i] != CellState::kFree) return false;
+  if (now - occupied_near_s_[i] > static_cast<float>(kTrail_s) || occupied_to_s_[i] - occupied_from_s_[i] > kPassed_s || global.state[i] != CellState::kFree) return false;
   for (int dy = -kBeside_cells; dy <= kBeside_cells; ++dy) {
     for (int dx = -kBeside_cells; dx <= kBeside_cells; ++dx) {
       if (combined.at(ix + dx, iy + dy) == CellState::kOccupied) return false;
@@ -47,7 +49,7 @@ bool MovingCells::is_trail(const MapLayer& global, const MapLayer& combined, int
   return true;
 }
 
-void MovingCells::update(const MapLayer& global, const MapLayer& combined, const CellWindow& window, double now_s) {
+void MovingCells::update(const MapLayer& global, const MapLayer& combined, const CellWindow& window, const Point2& robot, double now_s) {
   points_.clear();
   trail_.clear();
   if (geometry_.cell_count() != combined.state.size() || now_s < 0.0) return;
@@ -64,6 +66,7 @@ void MovingCells::update(const MapLayer& global, const MapLayer& combined, const
       if (combined.state[i] != CellState::kOccupied) continue;
       if (now - occupied_to_s_[i] > static_cast<float>(kStillThere_s)) occupied_from_s_[i] = now;
       occupied_to_s_[i] = now;
+      if (std::hypot(geometry_.center_x_m(ix) - robot.x_m, geometry_.center_y_m(iy) - robot.y_m) < kTrailWithin_m) occupied_near_s_[i] = now;
       const bool just = now - occupied_from_s_[i] < static_cast<float>(kFresh_s);
       if (just && global.state[i] == CellState::kFree) fresh.emplace_back(ix, iy);
     }

@@ -15,17 +15,17 @@ class MovingCells {
  public:
   static constexpr double kFresh_s = 1.0;  ///< a cell counts for so long
   static constexpr int kShift_cells = 3;   ///< what lies so near to something that stood there before is that
-  static constexpr double kTrail_s = 15.0;
+  static constexpr double kTrail_s = 15.0, kTrailWithin_m = 4.5;  ///< at 10 m a Kinect errs by half a metre
   static constexpr std::size_t kFewest = 4;  ///< cells; fewer are noise
 
   void reset(const MapLayer& layer);
-  /// Call after every new local map. @param window  of the cells that it covers
-  void update(const MapLayer& global, const MapLayer& combined, const CellWindow& window, double now_s);
+  /// Call after every new local map. @param window  of the cells that it covers @param robot  in the map
+  void update(const MapLayer& global, const MapLayer& combined, const CellWindow& window, const Point2& robot, double now_s);
 
   /// In the map.
   const std::vector<Point2>& points() const { return points_; }
-  /// Where somebody was on his way: occupied for a moment within the last kTrail_s, free again now, and nothing stands beside it. A thing
-  /// that comes into view leaves no trail, though its surface is at first seen some decimetres off.
+  /// Where somebody was on his way: occupied for a moment within the last kTrail_s and not far from the robot, free again now, and nothing
+  /// stands beside it. A thing that comes into view leaves no trail, though its surface is at first seen some decimetres off.
   const std::vector<Point2>& trail() const { return trail_; }
 
  private:
@@ -35,6 +35,7 @@ class MovingCells {
   GridGeometry geometry_;
   // Per cell, seconds; 0 = never.
   std::vector<float> occupied_from_s_, occupied_to_s_;
+  std::vector<float> occupied_near_s_;  ///< last, while the robot was within kTrailWithin_m
   double begin_s_ = -1.0;  ///< stamps count from here: a float holds the milliseconds of a day, not of an epoch
   std::vector<Point2> points_, trail_;
 };

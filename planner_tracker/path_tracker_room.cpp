@@ -15,7 +15,7 @@ double PathTracker::point_clearance_m(const TrackInput& input, double x_m, doubl
   const double seen = input.scan->clearance_m(x_m, y_m);
   if (input.layer == nullptr) return seen;
   const Point2 p = input.T_map_base * Point2{x_m, y_m};
-  return std::min(seen, input.layer->clearance_m(p.x_m, p.y_m));
+  return std::min(seen, input.layer->smooth_clearance_m(p.x_m, p.y_m));
 }
 
 double PathTracker::clearance_m(const TrackInput& input, double x_m, double y_m, double yaw_rad) const {

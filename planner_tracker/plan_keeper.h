@@ -31,16 +31,20 @@ class PlanKeeper {
 
   void set_map(const CombinedMap& map);
   void start_goal() {
-    path_.clear();
-    held_.clear();
-    held_since_s_ = -1.0;
-    elsewhere_ = look_elsewhere_ = false;
+    drop_path();
     looks_ = 0;
     rounds_ = 0;
     closed_.clear();
     shut_.clear();
     seen_shut_.clear();
     left_to_somebody_.clear();
+  }
+  /// The next plan is taken as it is. What was found closed is remembered.
+  void drop_path() {
+    path_.clear();
+    held_.clear();
+    held_since_s_ = -1.0;
+    elsewhere_ = look_elsewhere_ = false;
   }
   /// @param trail  points of the map at which somebody walked a moment ago, see MovingCells
   Outcome replan(CombinedMap& map, const Pose2& robot, const Point2& goal, double now_s, const std::vector<Point2>& trail = {});
@@ -70,9 +74,9 @@ class PlanKeeper {
   double old_cost_m(const MapLayer& layer, Path* path, const Point2& robot);
   /// What it costs to turn towards a path's beginning: the metres the robot could have driven meanwhile.
   double turning_cost_m(const Path& path, const Pose2& robot) const;
-  /// True if the way round is to be left alone for now.
   /// Forgets who closed a way and has walked on since.
   void let_walk_on(CombinedMap& map, double now_s);
+  /// True if the way round is to be left alone for now.
   bool hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& trail);
   void take(const std::vector<Point2>& path);
   /// There is no way now. Would there be one, where is it closed, and where can that be looked at from?

@@ -79,7 +79,7 @@ void PlannerTracker::set_local_map(const OccupancyGrid& local, const Pose2& T_ma
   State& s = *state_;
   s.map.set_local(local, T_map_local, s.last_step_s);
   if (s.map.empty()) return;
-  s.moving.update(s.map.global(), s.map.combined(), s.map.local_window(), s.last_step_s);
+  s.moving.update(s.map.global(), s.map.combined(), s.map.local_window(), {s.input.T_map_base.x_m, s.input.T_map_base.y_m}, s.last_step_s);
   s.walkers.update(s.moving.points(), s.map.combined(), s.input.T_map_base, s.last_step_s);
 }
 

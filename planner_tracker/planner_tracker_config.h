@@ -9,9 +9,9 @@ namespace knav {
 
 /// What the robot keeps away from, and how the maps are read.
 struct ClearanceConfig {
-  double hard_m = 0.05;
-  double insist = 0.6;
-  double keep = 0.4;
+  double hard_m = 0.04;
+  double insist = 0.75;
+  double keep = 0.5;
   double preferred_m = 0.25;
   double price = 2.0;
   double escape_m = 1.0;

@@ -185,8 +185,8 @@ bool PlannerTracker::State::given_up(double now_s, const RobotState& robot) {
 }
 
 bool PlannerTracker::State::avoiding(double now_s, const RobotState& robot) {
-  const bool driving =
-      !moves.active() && (command.activity == Activity::kDriving || keeper.path().remaining_m() > 0.3);
+  // Who stands to look at what closes the way is not trying to get on.
+  const bool driving = !moves.active() && looking_since_s < 0.0 && keeper.path().remaining_m() > 0.3;
   const double dithering = watch.dithering_s(now_s, robot.T_odom_base, driving, config.oscillation_distance);
   if (!moves.active()) {
     const bool waited =
@@ -216,7 +216,7 @@ bool PlannerTracker::State::avoiding(double now_s, const RobotState& robot) {
   act(Activity::kAvoiding, move);
   if (!moves.active()) {
     next_plan_s = -1.0;
-    keeper.start_goal();
+    keeper.drop_path();
   }
   return true;
 }

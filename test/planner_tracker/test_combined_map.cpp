@@ -311,6 +311,11 @@ TEST(Overlay, ALanesWidthDoesNotDependOnHowTheMapsLie) {
       }
       EXPECT_NEAR(widest_m, std::min(at_m - low_m, low_m + 0.54 - at_m), 0.009) << k << " at " << x_m;
     }
+    for (double y_m = low_m + 0.15; y_m < low_m + 0.4; y_m += 0.01) {
+      const double exact_m = std::min(y_m - low_m, low_m + 0.54 - y_m);
+      // The middle's ridge is cut off by half a cell at most.
+      EXPECT_NEAR(layer.smooth_clearance_m(2.05, y_m), exact_m, exact_m > 0.24 ? 0.028 : 0.012) << k << " at " << y_m - low_m;
+    }
   }
 }
 

@@ -20,7 +20,7 @@ class WatchedRoom : public ::testing::Test {
   void see(const OccupancyGrid& local) {
     now_s_ += 0.2;
     map_.set_local(local, {}, now_s_);
-    cells_.update(map_.global(), map_.combined(), map_.local_window(), now_s_);
+    cells_.update(map_.global(), map_.combined(), map_.local_window(), {robot_.x_m, robot_.y_m}, now_s_);
     walkers_.update(cells_.points(), map_.combined(), robot_, now_s_);
   }
   /// The side that somebody at this point turns to the robot.
