@@ -13,6 +13,7 @@ constexpr double kOffPath_m = 0.5;
 constexpr double kBeginning_m = 0.5;  ///< of a path, for its direction
 constexpr double kUnhurried = 1.5;  ///< times as long as at full speed
 constexpr double kMovesThere_m = 1.0;   ///< of where the way is closed
+constexpr double kNoWayRound_m = 100.0;  ///< that far is as good as none: a way that was found closed a moment ago
 constexpr double kWalkedThere_m = 1.5;  ///< who closes it has walked past so near to there
 constexpr double kWider_m = 0.05;      ///< a way once found closed must be wider by this on either side to turn back for
 
@@ -60,7 +61,7 @@ void PlanKeeper::let_walk_on(CombinedMap& map, double now_s) {
   left_to_somebody_.erase(std::remove_if(left_to_somebody_.begin(), left_to_somebody_.end(), gone), left_to_somebody_.end());
 }
 
-bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& trail) {
+bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& trail, bool round_is_shut) {
   const bool first = held_since_s_ < 0.0;
   if (first) {
     held_ = path_;
@@ -73,7 +74,7 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   if (way.size() < 2 || !cut_at_blockage(map.combined(), map.global(), !strict_, &way)) return false;
   double until_s = now_s + config_.planning.closed_memory_s;
   if (!seen_shut_.has(at_, kSamePlace_m, now_s)) seen_shut_.add(at_, now_s, until_s);
-  const double detour_m = result_.cost_m - held_.remaining_m();
+  const double detour_m = round_is_shut ? kNoWayRound_m : result_.cost_m - held_.remaining_m();
   if (detour_m < config_.planning.hold_detour_m) {
     shut_.add(at_, now_s, until_s);
     return false;
@@ -151,7 +152,10 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
   if (result_.code == PlanCode::kOk) {
     const double old = path_kind_ == kind ? old_cost_m(layer, &path_, robot) : kInfinite;
     const bool was_to_goal = kind == Outcome::kToGoal && (holding() || (path_kind_ == kind && !path_.empty()));
-    if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s, trail)) return Outcome::kToBlockage;
+    const auto barely_open = [&] {
+      return kind == Outcome::kToGoal && shut_.barely_open(map, result_.path, config_.hard_radius_m() + kWider_m, now_s);
+    };
+    if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s, trail, barely_open())) return Outcome::kToBlockage;
     held_since_s_ = -1.0;
     elsewhere_ = look_elsewhere_ = false;
     const bool same_end =
@@ -162,9 +166,6 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     const double now_cost = old + turning_cost_m(path_, T_map_robot), new_cost = result_.cost_m + turning_cost_m(tried_, T_map_robot);
     const bool clearly_better = new_cost < now_cost * (1.0 - config_.planning.switch_gain) &&
                                 new_cost < now_cost - config_.planning.switch_gain_m;
-    const auto barely_open = [&] {
-      return kind == Outcome::kToGoal && shut_.barely_open(map, result_.path, config_.hard_radius_m() + kWider_m, now_s);
-    };
     if (!same_end || !std::isfinite(old) || (clearly_better && !barely_open())) take(result_.path);
     path_kind_ = kind;
     return kind;

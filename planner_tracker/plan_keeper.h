@@ -77,7 +77,8 @@ class PlanKeeper {
   /// Forgets who closed a way and has walked on since.
   void let_walk_on(CombinedMap& map, double now_s);
   /// True if the way round is to be left alone for now.
-  bool hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& trail);
+  /// @param round_is_shut  it leads through what was found closed
+  bool hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& trail, bool round_is_shut);
   void take(const std::vector<Point2>& path);
   /// There is no way now. Would there be one, where is it closed, and where can that be looked at from?
   Outcome go_and_look(CombinedMap& map, const Point2& robot, const Point2& goal, double now_s);

@@ -50,6 +50,25 @@ TEST_F(TwoDoors, ADoorFoundShutIsGoneRoundAfterAMoment) {
   EXPECT_TRUE(goes_round());
 }
 
+TEST_F(TwoDoors, ADoorFoundShutIsNotTurnedBackForBecauseTheOneAheadSeemsClosedFromAfar) {
+  for (double t = 1.0; t < config_.planning.hold_s + kToSee_s; t += 0.5) look(0.0, t);
+  ASSERT_TRUE(goes_round());
+  // On its way round the robot sees the first as just wide enough, and something in the other.
+  OccupancyGrid seen = rooms(0.5);
+  fill(&seen, 5.95, 17.0, 6.05, 18.0, 100);
+  map_.set_local(seen, Pose2{});
+  const auto along = [&](double more_m) { return keeper_.path().point_at(keeper_.path().at_m() + more_m); };
+  const Point2 on_its_way = along(7.0), farther = along(8.0), there = along(13.0);
+  PlanResult back;
+  keeper_.planner().plan(map_.combined(), on_its_way, {10.0, 3.0}, &back);
+  ASSERT_EQ(back.code, PlanCode::kOk) << "or this tests nothing";
+  EXPECT_EQ(keeper_.replan(map_, {on_its_way.x_m, on_its_way.y_m, 0.0}, {10.0, 3.0}, 120.0), PlanKeeper::Outcome::kToBlockage) << "goes to see it first";
+  EXPECT_GT(keeper_.path().end().y_m, 12.0);
+  EXPECT_EQ(keeper_.replan(map_, {farther.x_m, farther.y_m, 0.0}, {10.0, 3.0}, 122.0), PlanKeeper::Outcome::kToBlockage);
+  for (double t = 124.0; t < 150.0; t += 0.5) keeper_.replan(map_, {there.x_m, there.y_m, 0.0}, {10.0, 3.0}, t);
+  EXPECT_LT(keeper_.path().end().y_m, 12.0) << "both were seen, and the first is open now";
+}
+
 TEST_F(TwoDoors, ForSomebodyWhoWalksThereTheRobotWaitsAsLongAsTheWayRoundIsLong) {
   // 28 m longer at most: 0.15 x 28 m / 0.6 m/s = 7 s.
   const double worth_s = config_.planning.hold_share * 28.0 / config_.max_vel_x;
