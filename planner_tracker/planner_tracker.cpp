@@ -208,6 +208,8 @@ Command PlannerTracker::State::step(double now_s, const RobotState& robot) {
     goal_allowed_s = 1e9;
     relocalized = false;
     jumps = corrections = 0;
+    doubted_s = -1e9;
+    unsure_since_s = -1.0;
     correct_until_s = -1.0;
     T_map_odom = robot.T_map_base * robot.T_odom_base.inverse();
     watch.start(now_s);

@@ -132,7 +132,7 @@ struct TrackingConfig {
 /// What happens when driving on is not possible.
 struct RecoveryConfig {
   double lost_timeout_s = 120.0;
-  double lost_turn_radps = 0.5;
+  double lost_turn_radps = 0.8;
   double wander_radius_m = 3.0;
   double wander_step_m = 2.5;
   double wander_mps = 0.3;

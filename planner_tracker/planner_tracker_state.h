@@ -37,6 +37,7 @@ struct PlannerTracker::State {
   void begin(const Pose2& T_map_goal);
   void end_goal();
   void wander();
+  bool in_doubt(double now_s, const RobotState& robot);
   void note_jump(double now_s, const RobotState& robot);
 
   // Each returns true if it decided what to do.
@@ -100,6 +101,8 @@ struct PlannerTracker::State {
   double lost_since_s = -1.0, found_since_s = -1.0, turned_rad = 0.0, last_yaw_rad = 0.0;
   bool lost_turn_done = false;
   int lost_rounds = 0;  ///< of looking round and wandering
+  double doubted_s = -1e9;       ///< when the robot last looked round because the localizer is in doubt
+  double unsure_since_s = -1.0;  ///< at the goal, by an estimate that is in doubt
   Pose2 T_odom_lost;
   std::size_t plans = 0;
   PlanResult asked;  ///< for make_plan

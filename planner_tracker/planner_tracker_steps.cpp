@@ -16,6 +16,10 @@ constexpr double kAllowance_s = 60.0;
 constexpr double kOpenEnough_m = 1.5;  ///< for a step aside
 constexpr double kFloorSeenFrom_m = 1.2;  ///< nearer, a level Kinect at 0.5 m does not see the floor
 
+constexpr double kSureWithin_s = 8.0;  ///< who was carried off is told so by then; in a building that has changed doubt may stay
+
+bool unsure(const RobotState& robot) { return robot.localization == LocalizationState::kUncertain; }
+
 Point2 position(const Pose2& pose) { return {pose.x_m, pose.y_m}; }
 
 }  // namespace
@@ -81,6 +85,14 @@ bool PlannerTracker::State::arrived(const RobotState& robot) {
   const bool still = std::abs(input.v_mps) < 0.01 && std::abs(robot.v_mps) < 0.05 &&
                      std::abs(input.w_radps) <= config.acc_lim_theta * input.dt_s + 1e-9;
   if (std::abs(error) < config.yaw_goal_tolerance && still) {
+    if (unsure(robot)) {
+      if (unsure_since_s < 0.0) unsure_since_s = last_step_s;
+      if (last_step_s - unsure_since_s < kSureWithin_s) {
+        act(Activity::kAligning, tracker.stop(input));
+        return true;
+      }
+    }
+    unsure_since_s = -1.0;
     if (distance > config.xy_goal_tolerance && corrections < config.goal_corrections) {
       // While it turned it saw more, and the localizer has it elsewhere now.
       ++corrections;
