@@ -69,6 +69,17 @@ TEST_F(TwoDoors, ADoorFoundShutIsNotTurnedBackForBecauseTheOneAheadSeemsClosedFr
   EXPECT_LT(keeper_.path().end().y_m, 12.0) << "both were seen, and the first is open now";
 }
 
+TEST_F(TwoDoors, AWayThatIsOpenAgainIsAnotherPathForWhoWatchesProgress) {
+  look(1.0, 0.5);
+  EXPECT_FALSE(keeper_.switched());
+  EXPECT_EQ(look(0.0, 1.0), PlanKeeper::Outcome::kToBlockage);
+  EXPECT_TRUE(keeper_.switched()) << "it ends before the door now";
+  EXPECT_EQ(look(0.0, 1.2), PlanKeeper::Outcome::kToBlockage);
+  EXPECT_FALSE(keeper_.switched()) << "coming nearer to the door is progress";
+  EXPECT_EQ(look(1.0, 1.4), PlanKeeper::Outcome::kToGoal);
+  EXPECT_TRUE(keeper_.switched()) << "what is left is more again, and is no lack of progress";
+}
+
 TEST_F(TwoDoors, ForSomebodyWhoWalksThereTheRobotWaitsAsLongAsTheWayRoundIsLong) {
   // 28 m longer at most: 0.15 x 28 m / 0.6 m/s = 7 s.
   const double worth_s = config_.planning.hold_share * 28.0 / config_.max_vel_x;
