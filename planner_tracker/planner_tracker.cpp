@@ -173,7 +173,13 @@ void PlannerTracker::State::note_jump(double now_s, const RobotState& robot) {
   constexpr int kMostJumps = 5;  // a localizer that jumps for ever must not keep a goal for ever
   const Pose2 expected = T_map_odom * robot.T_odom_base;
   T_map_odom = robot.T_map_base * robot.T_odom_base.inverse();
-  if (distance_m(expected, robot.T_map_base) < kElsewhere_m || ++jumps > kMostJumps) return;
+  const bool jumped = distance_m(expected, robot.T_map_base) >= kElsewhere_m;
+  if (robot.localization != LocalizationState::kUncertain) {
+    unproven = false;
+  } else if (jumped) {
+    unproven = true;
+  }
+  if (!jumped || ++jumps > kMostJumps) return;
   relocalized = true;
   watch.start(now_s);
 }
@@ -209,6 +215,7 @@ Command PlannerTracker::State::step(double now_s, const RobotState& robot) {
     relocalized = false;
     jumps = corrections = 0;
     doubted_s = -1e9;
+    unproven = false;
     unsure_since_s = -1.0;
     correct_until_s = -1.0;
     T_map_odom = robot.T_map_base * robot.T_odom_base.inverse();

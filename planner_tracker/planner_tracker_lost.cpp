@@ -52,8 +52,9 @@ bool PlannerTracker::State::in_doubt(double now_s, const RobotState& robot) {
 }
 
 bool PlannerTracker::State::stopped_by_lost(double now_s, const RobotState& robot) {
-  const bool doubt = in_doubt(now_s, robot);
-  const bool lost = robot.localization == LocalizationState::kLost || doubt;
+  const bool doubt = !unproven && in_doubt(now_s, robot);
+  // Nor is a place to drive on from that it has just jumped to and is not sure of.
+  const bool lost = robot.localization == LocalizationState::kLost || unproven || doubt;
   if (lost_since_s < 0.0) {
     if (!lost) return false;
     lost_since_s = now_s;

@@ -101,6 +101,7 @@ struct PlannerTracker::State {
   double lost_since_s = -1.0, found_since_s = -1.0, turned_rad = 0.0, last_yaw_rad = 0.0;
   bool lost_turn_done = false;
   int lost_rounds = 0;  ///< of looking round and wandering
+  bool unproven = false;         ///< the pose has jumped, and the localizer has not been sure of it since
   double doubted_s = -1e9;       ///< when the robot last looked round because the localizer is in doubt
   double unsure_since_s = -1.0;  ///< at the goal, by an estimate that is in doubt
   Pose2 T_odom_lost;

@@ -183,6 +183,22 @@ TEST(Recovery, InDoubtItWaitsAtTheGoalForTheLocalizerToBeSureOrToFindItElsewhere
   EXPECT_LT(took_s[true], took_s[false] + 15.0) << "with a look round";
 }
 
+TEST(Recovery, APlaceJustJumpedToIsNotDrivenOnFromUntilTheLocalizerIsSure) {
+  const OccupancyGrid grid = room(20.0, 6.0);
+  ToyWorld world(grid, grid, {2.0, 3.0, 0.0});
+  world.planner.set_goal({16.0, 3.0, 0.0});
+  world.run(3.0);
+  const Pose2 T_odom_base = world.T_map_odom.inverse() * world.T_map_base;
+  world.T_map_base = {14.0, 3.0, 0.0};  // it says; 2 m before the goal
+  world.T_map_odom = world.T_map_base * T_odom_base.inverse();
+  world.localization = LocalizationState::kUncertain;
+  const Command command = world.run(60.0);
+  EXPECT_FALSE(command.finished) << "neither there nor given up";
+  EXPECT_TRUE(command.activity == Activity::kLostTurning || command.activity == Activity::kLostWandering);
+  world.localization = LocalizationState::kOk;
+  EXPECT_EQ(world.run(60.0).activity, Activity::kReached);
+}
+
 TEST(Recovery, CarriedOffItHasTheTimeThatTheWayFromThereTakes) {
   const OccupancyGrid grid = room(70.0, 4.0);
   ToyWorld world(grid, grid, {1.0, 2.0, 0.0});
