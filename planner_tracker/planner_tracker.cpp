@@ -214,7 +214,6 @@ Command PlannerTracker::State::step(double now_s, const RobotState& robot) {
     goal_allowed_s = 1e9;
     relocalized = false;
     jumps = corrections = 0;
-    doubted_s = -1e9;
     unproven = false;
     unsure_since_s = -1.0;
     correct_until_s = -1.0;

@@ -10,7 +10,6 @@ namespace knav {
 namespace {
 
 constexpr double kFoundFor_s = 0.5;  ///< localized for this long ends the recovery
-constexpr double kDoubtAfter_s = 5.0, kDoubtAgain_s = 60.0;
 constexpr int kMoves = 2;            ///< between two looks round
 constexpr double kShortest_m = 0.4;  ///< of these; shorter ones show nothing new
 constexpr double kSees_m = 4.0;      ///< a direction more open than this is not better
@@ -43,41 +42,27 @@ void PlannerTracker::State::wander() {
   moves.start(kMoves, {kShortest_m, longest_m, kSees_m, config.recovery.wander_mps});
 }
 
-/// Not lost, but in doubt and not getting on: what closes the way may be there only by a pose that is wrong, and standing before it the
-/// localizer sees nothing new. Once in a while that is worth a look round.
-bool PlannerTracker::State::in_doubt(double now_s, const RobotState& robot) {
-  if (robot.localization != LocalizationState::kUncertain) return false;
-  if (lost_since_s >= 0.0 && doubted_s == lost_since_s) return lost_rounds == 0;  // until it has looked round
-  return watch.without_progress_s(now_s) > kDoubtAfter_s && now_s - doubted_s > kDoubtAgain_s;
-}
-
 bool PlannerTracker::State::stopped_by_lost(double now_s, const RobotState& robot) {
-  const bool doubt = !unproven && in_doubt(now_s, robot);
-  // Nor is a place to drive on from that it has just jumped to and is not sure of.
-  const bool lost = robot.localization == LocalizationState::kLost || unproven || doubt;
+  // A place that the localizer has just jumped to and is not sure of is none to drive on from.
+  const bool lost = robot.localization == LocalizationState::kLost || unproven;
   if (lost_since_s < 0.0) {
     if (!lost) return false;
     lost_since_s = now_s;
-    if (doubt) doubted_s = now_s;
     lost_turn_done = false;
     lost_rounds = 0;
     turned_rad = 0.0;
     last_yaw_rad = robot.T_odom_base.yaw_rad;
     T_odom_lost = robot.T_odom_base;
     moves.end();
-    if (doubt) {
-      keeper.drop_path();
-    } else {
-      keeper.start_goal();
-    }
-    explain(doubt ? "The localizer is in doubt where the robot is, and the way seems closed." : "The localizer does not know where the robot is.");
+    keeper.start_goal();
+    explain("The localizer does not know where the robot is.");
   }
   if (!lost) {
     // Not on the first good word: stands until it is sure.
     if (found_since_s < 0.0) found_since_s = now_s;
     act(Activity::kLostTurning, tracker.stop(input));
     if (now_s - found_since_s < kFoundFor_s) return true;
-    relocalized = relocalized || doubted_s != lost_since_s;
+    relocalized = true;
     lost_since_s = found_since_s = -1.0;
     moves.end();
     explain("");

@@ -37,7 +37,6 @@ struct PlannerTracker::State {
   void begin(const Pose2& T_map_goal);
   void end_goal();
   void wander();
-  bool in_doubt(double now_s, const RobotState& robot);
   void note_jump(double now_s, const RobotState& robot);
 
   // Each returns true if it decided what to do.
@@ -102,7 +101,6 @@ struct PlannerTracker::State {
   bool lost_turn_done = false;
   int lost_rounds = 0;  ///< of looking round and wandering
   bool unproven = false;         ///< the pose has jumped, and the localizer has not been sure of it since
-  double doubted_s = -1e9;       ///< when the robot last looked round because the localizer is in doubt
   double unsure_since_s = -1.0;  ///< at the goal, by an estimate that is in doubt
   Pose2 T_odom_lost;
   std::size_t plans = 0;

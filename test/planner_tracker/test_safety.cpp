@@ -148,26 +148,6 @@ TEST(Recovery, ALostRobotLooksRoundWandersFartherEachTimeAndGoesOnWhenFound) {
   EXPECT_EQ(world.collisions, 0);
 }
 
-TEST(Recovery, InDoubtBeforeAClosedWayTheRobotLooksRoundOnceAndThenGivesUpAsEver) {
-  OccupancyGrid map = room(12.0, 4.0);
-  OccupancyGrid truth = map;
-  fill(&truth, 6.0, 0.0, 6.1, 4.0, 100);
-  ToyWorld world(truth, map, {2.0, 2.0, 0.0});
-  world.localization = LocalizationState::kUncertain;
-  world.planner.set_goal({10.0, 2.0, 0.0});
-  int looks = 0;
-  Command command;
-  Activity before = Activity::kDriving;
-  for (int i = 0; i < 2400 && !command.finished; ++i) {
-    command = world.step();
-    if (command.activity == Activity::kLostTurning && before != Activity::kLostTurning && before != Activity::kLostWandering) ++looks;
-    before = command.activity;
-  }
-  EXPECT_EQ(looks, 1);
-  ASSERT_EQ(command.activity, Activity::kFailed);
-  EXPECT_EQ(world.planner.failure().code, FailureCode::kBlocked);
-}
-
 TEST(Recovery, InDoubtItWaitsAtTheGoalForTheLocalizerToBeSureOrToFindItElsewhere) {
   const OccupancyGrid grid = room(8.0, 4.0);
   double took_s[2];
@@ -180,7 +160,7 @@ TEST(Recovery, InDoubtItWaitsAtTheGoalForTheLocalizerToBeSureOrToFindItElsewhere
     took_s[doubts] = world.now_s - began_s;
   }
   EXPECT_GT(took_s[true], took_s[false] + 5.0);
-  EXPECT_LT(took_s[true], took_s[false] + 15.0) << "with a look round";
+  EXPECT_LT(took_s[true], took_s[false] + 10.0);
 }
 
 TEST(Recovery, APlaceJustJumpedToIsNotDrivenOnFromUntilTheLocalizerIsSure) {
