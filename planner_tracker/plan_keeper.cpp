@@ -100,7 +100,6 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   }
   path_.set(way);
   path_kind_ = Outcome::kToBlockage;
-  switched_ = switched_ || first;
   return true;
 }
 
@@ -130,7 +129,6 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     path_ = held_;
     path_kind_ = kind;
     held_since_s_ = -1.0;
-    switched_ = true;
   }
   const bool no_new_way = result_.code == PlanCode::kNoPath || result_.code == PlanCode::kStartBlocked;
   if (no_new_way && kind == Outcome::kToGoal && path_kind_ == kind && std::isfinite(old_cost_m(layer, &path_, robot))) {

@@ -62,6 +62,8 @@ class PlanKeeper {
   bool switched() const { return switched_; }
   int switches() const { return switches_; }
 
+  /// Along path(); while holding, along the way that is held: seeing it open and closed by turns is neither progress nor the lack of it.
+  double remaining_m() const { return holding() ? held_.remaining_m() + held_.offset_m() : path_.remaining_m() + path_.offset_m(); }
   Path& path() { return path_; }
   const Path& path() const { return path_; }
   const Point2& at() const { return at_; }

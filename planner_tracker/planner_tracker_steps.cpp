@@ -171,7 +171,7 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
 
 bool PlannerTracker::State::given_up(double now_s, const RobotState& robot) {
   keeper.path().advance(position(robot.T_map_base));
-  watch.progress(now_s, keeper.path().remaining_m() + keeper.path().offset_m(), keeper.switched() && !keeper.elsewhere());
+  watch.progress(now_s, keeper.remaining_m(), keeper.switched() && !keeper.elsewhere());
   const bool stuck = watch.without_progress_s(now_s) > config.planning.blocked_timeout_s;
   const bool slow = !relocalized && now_s - goal_start_s > goal_allowed_s;
   if (!stuck && !slow) return false;

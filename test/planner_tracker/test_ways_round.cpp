@@ -69,15 +69,14 @@ TEST_F(TwoDoors, ADoorFoundShutIsNotTurnedBackForBecauseTheOneAheadSeemsClosedFr
   EXPECT_LT(keeper_.path().end().y_m, 12.0) << "both were seen, and the first is open now";
 }
 
-TEST_F(TwoDoors, AWayThatIsOpenAgainIsAnotherPathForWhoWatchesProgress) {
+TEST_F(TwoDoors, WhatIsLeftOfTheWayIsTheSameWhetherItIsSeenOpenOrClosed) {
   look(1.0, 0.5);
-  EXPECT_FALSE(keeper_.switched());
+  const double left_m = keeper_.remaining_m();
   EXPECT_EQ(look(0.0, 1.0), PlanKeeper::Outcome::kToBlockage);
-  EXPECT_TRUE(keeper_.switched()) << "it ends before the door now";
-  EXPECT_EQ(look(0.0, 1.2), PlanKeeper::Outcome::kToBlockage);
-  EXPECT_FALSE(keeper_.switched()) << "coming nearer to the door is progress";
+  EXPECT_LT(keeper_.path().remaining_m(), left_m - 3.0) << "it ends before the door now";
+  EXPECT_NEAR(keeper_.remaining_m(), left_m, 0.01);
   EXPECT_EQ(look(1.0, 1.4), PlanKeeper::Outcome::kToGoal);
-  EXPECT_TRUE(keeper_.switched()) << "what is left is more again, and is no lack of progress";
+  EXPECT_NEAR(keeper_.remaining_m(), left_m, 0.01);
 }
 
 TEST_F(TwoDoors, ForSomebodyWhoWalksThereTheRobotWaitsAsLongAsTheWayRoundIsLong) {
