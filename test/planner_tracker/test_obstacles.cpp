@@ -125,8 +125,7 @@ TEST(Obstacles, SomethingOnTheGoalIsApproachedThenGivenUpWithThePoint) {
   EXPECT_NEAR(world.planner.failure().at.x_m, 6.0, 0.3 + 0.25 + 0.05) << world.planner.failure().reason;
   EXPECT_NEAR(world.planner.failure().at.y_m, 2.5, 0.3 + 0.25 + 0.05) << world.planner.failure().reason;
   EXPECT_LT(nearest_m, 1.2);
-  // It looks from up to 1.25 times that far from where it is closed, up to 0.6 m before the goal.
-  EXPECT_LT(world.distance_to({6.0, 2.5, 0.0}), 1.25 * PlannerTrackerConfig{}.planning.look_distance_m + 0.6);
+  EXPECT_LT(world.distance_to({6.0, 2.5, 0.0}), 1.25 * PlannerTrackerConfig{}.planning.look_distance_m + 0.2);
   EXPECT_EQ(world.collisions, 0);
 }
 
