@@ -39,7 +39,8 @@ nlohmann::json identity(const GoalSessionOptions& o) {
           {"runs", o.suite.runs},
           {"goals", o.suite.goals},
           {"kidnaps", o.suite.kidnaps},
-          {"people", o.suite.people}};
+          {"people", o.suite.people},
+          {"unchanged", o.suite.unchanged}};
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ class GoalMaker {
     random_ = RandomStream(static_cast<std::uint64_t>(config_.seed), random_stream::kChanges, static_cast<std::uint64_t>(run), 7);
     SuiteRun out;
     out.name = fmt::format("{} {}", world_.name, run + 1);
-    const Sealed sealed = seal_a_door();
+    const Sealed sealed = config_.unchanged ? Sealed{} : seal_a_door();
     floor_ = known_only(plan_.reachable(kFloorClearance_m, sealed.leaf));
     if (floor_.size() < 20) throw UserError(world_.file + ": the map knows too little floor to send a robot about.");
     at_ = {world_.spawn.x_m, world_.spawn.y_m};
@@ -68,7 +68,7 @@ class GoalMaker {
     }
     for (SuiteGoal& goal : refused) insert(std::move(goal), &out.goals);
     for (int k = 0; k < kidnaps; ++k) out.goals.push_back(kidnapped());
-    out.changes = changes(sealed, out.goals);
+    if (!config_.unchanged) out.changes = changes(sealed, out.goals);
     return out;
   }
 

@@ -46,6 +46,7 @@ struct GoalSuiteConfig {
   int goals = 67;    ///< over all runs
   int kidnaps = 7;   ///< further ones
   int people = 10;   ///< in every run
+  bool unchanged = false;  ///< the building is as it was mapped, and nobody is in it
   double robot_radius_m = 0.20;
   double shortest_way_m = 5.0, longest_way_m = 18.0;
 };

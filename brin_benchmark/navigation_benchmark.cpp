@@ -65,7 +65,7 @@ void drive(const GoalSessionOptions& options) {
   session.run([](const std::string& stem) { return std::make_unique<FailureBag>(stem); }, progress);
   bar.reset();
   report(options.out, read_goal_results(options.out),
-         {about_today(), fmt::format("world {}, {} people", options.world, options.suite.people),
+         {about_today(), fmt::format("world {}, {}", options.world, options.suite.unchanged ? "unchanged, nobody about" : fmt::format("{} people", options.suite.people)),
           fmt::format("config {}, sensor {}, odometry {}, seed {}{}", options.config.empty() ? "default" : options.config,
                       options.sensor, options.odometry, options.suite.seed,
                       std::string(options.true_map ? ", true map" : "") + (options.quick ? ", quick" : ""))});
@@ -109,6 +109,7 @@ int main(int argc, char** argv) {
   app.add_option("--people", suite.people, "in every run; 0 = 3 to 6")->check(CLI::Range(0, 100))->capture_default_str();
   app.add_option("--run", options.run, "drive only this run, counted from 1; 0 = all")->capture_default_str();
   app.add_option("--jobs", options.jobs, "runs driven at a time")->check(CLI::Range(1, 256))->capture_default_str();
+  app.add_flag("--unchanged", suite.unchanged, "the building is as it was mapped, and nobody walks about");
   app.add_option("--seed", suite.seed, "of goals, changes and all noise")->check(CLI::Range(0, 1000000))->capture_default_str();
   app.add_flag("--quick", options.quick, "one run, four goals and a kidnap");
   app.add_option("--out", options.out, "folder for map, goals, runs and report")->required();

@@ -12,6 +12,11 @@ constexpr int kReach_bins = 5;         // neighbours on either side that a norma
 constexpr double kMinBaseline_m = 0.1;  // of a normal
 constexpr double kNormal_sd_m = 0.005;   // whatever the angle
 constexpr double kRangeMin_m = 0.3, kRangeMax_m = 20.0;
+constexpr double kMerge_s = 5.0;         // frames farther apart in time are not averaged
+constexpr double kSameSurface_sd = 3.0;  // a reading farther off than so many standard deviations is of another surface
+
+/// Of one frame's reading in a bin.
+double noise_sd_m(double depth_m) { return 0.01 + 0.003 * depth_m * depth_m; }
 
 /// Of a reading along its ray. A calibrated Kinect, its profile smoothed over some columns, is wrong by 0.5 % of the
 /// range (sd, 2 to 18 m, simulated BRIN building), most of it steadily; noise grows with the range squared.
@@ -21,7 +26,7 @@ double range_sd_m(bool depth_camera, double range_m) {
 
 }  // namespace
 
-DriveView::DriveView(const Drive& drive, int keyframe) {
+DriveView::DriveView(const JointRefinementConfig& config, const Drive& drive, int keyframe) : far_m_(config.far_m) {
   const Keyframe& k = drive.keyframes[static_cast<std::size_t>(keyframe)];
   const auto after = std::lower_bound(drive.frames.begin(), drive.frames.end(), k.stamp_s,
                                       [](const DriveFrame& f, double s) { return f.stamp_s < s; });
@@ -34,6 +39,7 @@ DriveView::DriveView(const Drive& drive, int keyframe) {
   if (std::fabs(nearest->stamp_s - k.stamp_s) > kNearFrame_s) return;
   T_keyframe_sensor_ = k.T_drive_base.inverse() * nearest->T_drive_base * nearest->T_base_sensor;
   std::visit([&](const auto& data) { fill(data); }, nearest->data);
+  if (pinhole_) average(config, drive.frames, static_cast<std::size_t>(nearest - drive.frames.begin()));
   place({});
 }
 
@@ -61,6 +67,65 @@ void DriveView::fill(const DepthProfile& profile) {
     point.depth_m = static_cast<double>(*middle);
     const double range_m = point.depth_m * point.direction.norm();
     point.valid = range_m > kRangeMin_m && range_m < std::min(kRangeMax_m, profile.range_max_m);
+  }
+}
+
+/// Every bin becomes the mean of what the frames beside `own` saw in its direction, as seen from `own`: a Kinect's noise is new
+/// with every frame, and from so near its steady errors are the same.
+void DriveView::average(const JointRefinementConfig& config, const std::vector<DriveFrame>& frames, std::size_t own) {
+  struct Reading {
+    double depth_m, column_share;
+  };
+  std::vector<std::vector<Reading>> of_bin(points_.size());
+  const DriveFrame& middle = frames[own];
+  const Pose2 T_sensor_drive = (middle.T_drive_base * middle.T_base_sensor).inverse();
+  std::size_t used = 0;
+  DriveView one;
+  const auto take = [&](const DriveFrame& frame) {
+    const auto* profile = std::get_if<DepthProfile>(&frame.data);
+    if (profile == nullptr || std::fabs(frame.path_m - middle.path_m) > config.merge_m ||
+        std::fabs(frame.stamp_s - middle.stamp_s) > kMerge_s ||
+        std::fabs(normalize_angle_rad(frame.T_drive_base.yaw_rad - middle.T_drive_base.yaw_rad)) >
+            config.merge_deg * kPi / 180.0) {
+      return false;
+    }
+    one.points_.clear();
+    one.fill(*profile);
+    const Pose2 T_middle_sensor = T_sensor_drive * frame.T_drive_base * frame.T_base_sensor;
+    for (const ViewPoint& p : one.points_) {
+      if (!p.valid) continue;
+      const Point2 at = T_middle_sensor * Point2{p.depth_m * p.direction.x(), p.depth_m * p.direction.y()};
+      const int bin = bin_at(at);
+      if (bin >= 0) of_bin[static_cast<std::size_t>(bin)].push_back({at.x_m, p.column_share});
+    }
+    ++used;
+    return true;
+  };
+  for (std::size_t i = own; i < frames.size() && take(frames[i]);) ++i;
+  for (std::size_t i = own; i > 0 && take(frames[i - 1]);) --i;
+  std::vector<double> depth_m;
+  for (std::size_t b = 0; b < points_.size(); ++b) {
+    const std::vector<Reading>& readings = of_bin[b];
+    ViewPoint& point = points_[b];
+    point.valid = false;
+    if (readings.empty() || 4 * readings.size() < used) continue;
+    depth_m.clear();
+    for (const Reading& r : readings) depth_m.push_back(r.depth_m);
+    const auto half = depth_m.begin() + static_cast<std::ptrdiff_t>(depth_m.size() / 2);
+    std::nth_element(depth_m.begin(), half, depth_m.end());
+    const double gate_m = kSameSurface_sd * noise_sd_m(*half);
+    double sum_m = 0.0, share = 0.0;
+    std::size_t count = 0;
+    for (const Reading& r : readings) {
+      if (std::fabs(r.depth_m - *half) > gate_m) continue;  // beyond an edge
+      sum_m += r.depth_m;
+      share += r.column_share;
+      ++count;
+    }
+    if (2 * count < readings.size()) continue;
+    point.depth_m = sum_m / static_cast<double>(count);
+    point.column_share = share / static_cast<double>(count);
+    point.valid = point.depth_m * point.direction.norm() < kRangeMax_m;
   }
 }
 
@@ -133,6 +198,8 @@ void DriveView::find_normals() {
         across > 0.1 * along) {
       continue;
     }
+    // What is steadily wrong with far readings is the same for a whole wall, and grows faster than their noise.
+    if (pinhole_) p.sd_m *= 1.0 + range_m * range_m / (far_m_ * far_m_);
     p.normal = normal;
     p.on_line = p.position + mean.dot(normal) * normal;
     p.straight = true;
@@ -140,7 +207,10 @@ void DriveView::find_normals() {
 }
 
 int DriveView::bin_of(const Eigen::Vector2d& point) const {
-  const Point2 at = T_keyframe_sensor_.inverse() * Point2{point.x(), point.y()};
+  return bin_at(T_keyframe_sensor_.inverse() * Point2{point.x(), point.y()});
+}
+
+int DriveView::bin_at(const Point2& at) const {
   double column = 0.0;
   if (pinhole_) {
     if (at.x_m < 0.1) return -1;

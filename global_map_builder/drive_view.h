@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "global_map_builder/drive.h"
+#include "global_map_builder/map_builder_config.h"
 #include "global_map_builder/range_offset.h"
 
 namespace knav {
@@ -23,11 +24,12 @@ struct ViewPoint {
   double range_m = 0.0;
 };
 
-/// The frame at a keyframe as points of surfaces, a bin of neighbouring columns each.
+/// What was seen at a keyframe as points of surfaces, a bin of neighbouring columns each.
 class DriveView {
  public:
-  /// `keyframe` of `drive`; empty if no frame was kept near it.
-  DriveView(const Drive& drive, int keyframe);
+  /// `keyframe` of `drive`; empty if no frame was kept near it. Of a depth camera, the frames up to merge_m and merge_deg away
+  /// are averaged.
+  DriveView(const JointRefinementConfig& config, const Drive& drive, int keyframe);
 
   bool empty() const { return points_.empty(); }
   bool depth_camera() const { return pinhole_; }
@@ -40,14 +42,18 @@ class DriveView {
   int bin_of(const Eigen::Vector2d& point) const;
 
  private:
+  DriveView() = default;
   void fill(const DepthProfile& profile);
   void fill(const RangeScan& scan);
+  int bin_at(const Point2& in_sensor) const;
+  void average(const JointRefinementConfig& config, const std::vector<DriveFrame>& frames, std::size_t own);
   void find_normals();
 
   Pose2 T_keyframe_sensor_;
   bool pinhole_ = true;
   double fx_px_ = 1.0, cx_px_ = 0.0, angle_min_rad_ = 0.0, angle_increment_rad_ = 1.0;
   double bin_columns_ = 1.0;
+  double far_m_ = 1.0;
   std::vector<ViewPoint> points_;
 };
 

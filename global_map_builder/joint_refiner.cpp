@@ -21,6 +21,8 @@ constexpr double kFade_sd = 3.0;  // a point that is off by so many standard dev
 /// Information of the offsets' sum. An offset of all columns alike bends drives almost as freely as it bends walls, so
 /// that millimetres elsewhere (the rows of a moving camera's image) would be taken for it: it stays 0.
 constexpr double kMean = 1e8;
+/// How much more a closure of the user's list weighs here: what many views say does not overrule him.
+constexpr double kAllowed = 100.0;
 constexpr double kHold = 1e12;  // information of what must not move
 
 /// The normal equations of all poses (sparse) and all offsets (few, joined to everything).
@@ -84,6 +86,22 @@ void add_edge(const PoseGraphEdge& edge, const std::vector<Pose2>& poses, double
   all->add_block(edge.to, edge.from, B.transpose() * W * A);
 }
 
+/// The mapper's step from one keyframe to the next is better across the way, and in heading, than along it; for finding closures
+/// all are taken to be alike, since a step that is trusted too much keeps true closures out.
+void stiffen_step(const JointRefinementConfig& config, PoseGraphEdge* step) {
+  // In the axes of the later keyframe, as the information is.
+  const double c = std::cos(step->T_from_to.yaw_rad), s = std::sin(step->T_from_to.yaw_rad);
+  const Eigen::Vector2d way(c * step->T_from_to.x_m + s * step->T_from_to.y_m,
+                            -s * step->T_from_to.x_m + c * step->T_from_to.y_m);
+  constexpr double kStanding_m = 0.02;
+  const Eigen::Vector2d across =
+      way.norm() > kStanding_m ? Eigen::Vector2d(-way.y(), way.x()).normalized() : Eigen::Vector2d(0.0, 1.0);
+  Eigen::Matrix3d scale = Eigen::Matrix3d::Identity();
+  scale.topLeftCorner<2, 2>() += (1.0 / config.step_across_share - 1.0) * across * across.transpose();
+  scale(2, 2) = 1.0 / config.step_heading_share;
+  step->information = scale * step->information * scale;
+}
+
 /// How large an offset can be at all, and that it varies slowly.
 void add_offset_prior(const JointRefinementConfig& config, const std::vector<RangeOffset>& offset, Equations* all) {
   const double size = 1.0 / (config.offset_sd_per_m * config.offset_sd_per_m), slope = 4.0 * size;
@@ -138,7 +156,7 @@ class Refiner {
  public:
   Refiner(const JointRefinementConfig& config, const std::vector<Drive>& drives, const PoseGraph& graph,
           double robust_scale)
-      : config_(config), graph_(graph), fade_chi2_(robust_scale * robust_scale) {
+      : config_(config), fade_chi2_(robust_scale * robust_scale) {
     double before_m = 0.0;
     for (std::size_t d = 0; d < drives.size(); ++d) {
       for (std::size_t k = 0; k < drives[d].keyframes.size(); ++k) {
@@ -149,13 +167,22 @@ class Refiner {
     }
     for (std::size_t d = 0; d < drives.size(); ++d) {
       for (std::size_t k = 0; k < drives[d].keyframes.size(); ++k)
-        views_.emplace_back(drives[d], static_cast<int>(k));
+        views_.emplace_back(config, drives[d], static_cast<int>(k));
     }
     offset_.resize(drives.size());
     for (const auto& [id, pose] : graph.nodes) poses_.push_back(pose);
     held_.assign(poses_.size(), false);
     for (const int node : anchor_nodes(graph)) held_[static_cast<std::size_t>(node)] = true;
     for (const int node : graph.held) held_[static_cast<std::size_t>(node)] = true;
+    edges_ = graph.edges;
+    for (PoseGraphEdge& edge : edges_) {
+      if (edge.robust) continue;
+      if (edge.to != edge.from + 1) {
+        edge.information *= kAllowed;
+      } else if (views_[static_cast<std::size_t>(edge.to)].depth_camera()) {
+        stiffen_step(config, &edge);
+      }
+    }
   }
 
   void set_fade(double scale) { fade_sd_ = scale * kFade_sd; }
@@ -177,9 +204,9 @@ class Refiner {
     Equations all(poses_.size(), offset_.size());
     for_pairs(gate_m, [&](const ViewPair& pair, const PairEquations& e) {
       add_pair(pair, drive_of_[static_cast<std::size_t>(pair.from)], drive_of_[static_cast<std::size_t>(pair.to)], e,
-               config_.point_weight, &all);
+               weight_of(pair), &all);
     });
-    for (const PoseGraphEdge& edge : graph_.edges) add_edge(edge, poses_, fade_chi2_, &all);
+    for (const PoseGraphEdge& edge : edges_) add_edge(edge, poses_, fade_chi2_, &all);
     add_offset_prior(config_, offset_, &all);
     for (std::size_t i = 0; i < held_.size(); ++i) {
       if (held_[i]) all.add_lower(static_cast<int>(i), static_cast<int>(i), kHold * Eigen::Matrix3d::Identity());
@@ -208,6 +235,11 @@ class Refiner {
   std::size_t pairs() const { return pairs_.size(); }
 
  private:
+  double weight_of(const ViewPair& pair) const {
+    const bool camera = views_[static_cast<std::size_t>(pair.from)].depth_camera() ||
+                        views_[static_cast<std::size_t>(pair.to)].depth_camera();
+    return camera ? config_.point_weight : config_.scan_point_weight;
+  }
   /// In the order of pairs, whatever the number of threads.
   template <class Take>
   void for_pairs(double gate_m, const Take& take) {
@@ -224,7 +256,6 @@ class Refiner {
   }
 
   const JointRefinementConfig& config_;
-  const PoseGraph& graph_;
   double fade_chi2_;
   std::vector<DriveView> views_;
   std::vector<int> drive_of_;
@@ -232,6 +263,7 @@ class Refiner {
   std::vector<Pose2> poses_;
   std::vector<RangeOffset> offset_;
   std::vector<bool> held_;
+  std::vector<PoseGraphEdge> edges_;
   std::vector<ViewPair> pairs_;
   double fade_sd_ = kFade_sd;
 };

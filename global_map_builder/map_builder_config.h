@@ -14,10 +14,10 @@ struct DriveConfig {
   double frame_distance_m = 0.03;
   double frame_angle_deg = 1.0;
   double frame_period_s = 1.0;
-  double keyframe_distance_m = 0.5;
-  double keyframe_angle_deg = 30.0;
+  double keyframe_distance_m = 0.25;
+  double keyframe_angle_deg = 8.0;
   double position_sd_per_m = 0.02;
-  double position_sd_floor_m = 0.005;
+  double position_sd_floor_m = 0.0025;
   double heading_sd_deg_per_m = 0.4;
   double heading_sd_per_turn = 0.01;
   double filter_share = 0.05;
@@ -158,12 +158,18 @@ struct RefinementConfig {
 /// Bending the whole drive until all that was seen fits together, after the closures.
 struct JointRefinementConfig {
   bool enabled = true;
-  int max_partners = 30;
-  double min_path_m = 0.9;
+  int max_partners = 60;
+  double min_path_m = 0.1;
   double max_apart_m = 20.0;
-  double min_shared = 0.12;
+  double min_shared = 0.06;
   double gate_m = 0.4;
-  double point_weight = 0.005;
+  double merge_m = 0.06;
+  double merge_deg = 4.6;
+  double far_m = 8.0;
+  double point_weight = 0.15;
+  double scan_point_weight = 0.1;
+  double step_across_share = 0.3;
+  double step_heading_share = 0.5;
   double offset_sd_per_m = 0.001;
   int rounds = 2;
   int steps = 6;
@@ -177,8 +183,18 @@ struct JointRefinementConfig {
     v.number("max_apart_m", max_apart_m, 1, 100, "m", "Neither are those farther apart than this.");
     v.number("min_shared", min_shared, 0.05, 1, "", "Share of a view that the other must see.");
     v.number("gate_m", gate_m, 0.05, 5, "m", "Surfaces farther apart than this are two.");
-    v.number("point_weight", point_weight, 1e-4, 1, "",
-             "Weight of a point beside the graph's edges: neighbouring readings and frames share their errors.");
+    v.number("merge_m", merge_m, 0, 1, "m",
+             "A depth camera's frames up to this far along the drive on both sides of a keyframe are averaged, ...");
+    v.number("merge_deg", merge_deg, 0, 45, "deg", "... if they look the same way up to this angle.");
+    v.number("far_m", far_m, 1, 1000, "m",
+             "A depth camera's reading from so far counts a quarter of what its noise alone would let it: what is steadily wrong with it "
+             "is the same for a whole wall.");
+    v.number("point_weight", point_weight, 1e-4, 10, "",
+             "Weight of a depth camera's point beside the graph's edges: neighbouring readings and frames share their errors.");
+    v.number("scan_point_weight", scan_point_weight, 1e-4, 10, "", "The same of a scanner's point.");
+    v.number("step_across_share", step_across_share, 0.01, 1, "",
+             "A depth camera's steps from keyframe to keyframe are trusted, across the way, to this share of drive/position_sd_per_m, ...");
+    v.number("step_heading_share", step_heading_share, 0.01, 1, "", "... and their heading to this share of drive/heading_sd_deg_per_m.");
     v.number("offset_sd_per_m", offset_sd_per_m, 1e-7, 0.05, "1/m",
              "How wrong a depth camera's disparity may steadily be, column against column (sd; 0.001 is 1 % at 10 m).");
     v.integer("rounds", rounds, 1, 100, "", "Times that views are paired anew.");

@@ -12,8 +12,6 @@ constexpr double kMinFacing = 0.85;     // cosine between two surfaces' normals
 constexpr double kMaxAlong_m = 0.4;     // between two points of one surface, along it
 constexpr double kProbeGate_m = 0.5;
 constexpr double kMinAgreeing = 0.5;    // share of what both should see
-// A scanner's errors are new with every frame, those of a depth camera mostly stay.
-constexpr double kScannerWeight = 5.0;
 constexpr std::size_t kProbes = 24;     // points that tell whether two views share anything
 
 struct Relative {
@@ -97,7 +95,6 @@ void compare_views(const DriveView& from, const DriveView& to, const Pose2& T_ma
   Eigen::Vector2d q;
   Eigen::Matrix<double, PairEquations::kSize, 1> J;
   double comparable = 0.0, agreeing = 0.0;
-  const double sensor = from.depth_camera() || to.depth_camera() ? 1.0 : kScannerWeight;
   for (const ViewPoint& p : to.points()) {
     if (!p.straight) continue;
     bool hidden = false;
@@ -122,7 +119,7 @@ void compare_views(const DriveView& from, const DriveView& to, const Pose2& T_ma
     const int second = PairEquations::kOffset + RangeOffset::kKnots;
     J(second + pp.first) += (1.0 - pp.share) * dp;
     J(second + pp.first + 1) += pp.share * dp;
-    const double w = sensor * fade / variance;
+    const double w = fade / variance;
     out->H.noalias() += (w * J) * J.transpose();
     out->g.noalias() += (w * off) * J;
   }

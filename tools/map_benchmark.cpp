@@ -31,11 +31,11 @@ constexpr char kHelp[] =
     "  button     closures by the button only\n"
     "  automatic  by matching only\n"
     "  both       the default\n"
-    "  falsified  both, 5 % of the closures found moved by metres on purpose";
+    "  falsified  both, 5 % of the closures found moved by metres on purpose; drawn anew until it is one at least";
 constexpr char kJsonHelp[] =
     R"(The JSON holds, per seed and row: ate_m (root mean square, after rigid alignment), ate_before_m (of the local
 mapper alone), map_rmse_m, map_median_m, map_percentile_95_m, map_completeness (as evaluate_map), closures_found,
-closures_accepted, worst_closure_m and worst_closure_deg (of the accepted ones, against the truth), build_s.)";
+closures_accepted, closures_falsified, worst_closure_m and worst_closure_deg (of the accepted ones, against the truth), build_s.)";
 
 struct Options {
   std::string world = "config/worlds/brin_building.yaml", tour = "config/worlds/brin_tour.yaml";
@@ -87,6 +87,13 @@ MapRecord on_the_truth(MapRecord record, const Trajectory& truth) {
                      drive.keyframes[static_cast<std::size_t>(edge.to)].T_drive_base;
   }
   return record;
+}
+
+constexpr int kDraws = 50;  // of what is falsified: 5 % of few closures is often none
+
+int falsified(const BuiltMap& built) {
+  return static_cast<int>(std::count_if(built.record.closures.begin(), built.record.closures.end(),
+                                        [](const Closure& c) { return c.source == "falsified"; }));
 }
 
 MapBuilderConfig config_of(const std::string& row, MapBuilderConfig config) {
@@ -145,12 +152,17 @@ void benchmark(const Options& options) {
     const double before_m =
         absolute_trajectory_error_m(record.drives[0].trajectory, recording.truth, &matched);
     for (const std::string& row : options.rows) {
-      const auto start = std::chrono::steady_clock::now();
-      MapBuilder builder(config_of(row, config), mapper);
-      builder.build_again(row == "truth" ? on_the_truth(record, recording.truth) : record);
-      BuiltMap built = builder.build([](const char*, double) { stop_if_interrupted(); });
-      const double build_s =
-          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      MapBuilderConfig row_config = config_of(row, config);
+      BuiltMap built;
+      double build_s = 0.0;
+      for (int draw = 0; draw < kDraws; ++draw, ++row_config.closures.falsify_seed) {
+        const auto start = std::chrono::steady_clock::now();
+        MapBuilder builder(row_config, mapper);
+        builder.build_again(row == "truth" ? on_the_truth(record, recording.truth) : record);
+        built = builder.build([](const char*, double) { stop_if_interrupted(); });
+        build_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        if (row != "falsified" || falsified(built) > 0) break;
+      }
       const double ate_m = absolute_trajectory_error_m(built.map.trajectory, recording.truth, &matched);
       const MapEvaluation e = evaluate_map(built.map.distance, world, recording.truth, {});
       const ClosureErrors errors = closure_errors(built.record, recording.truth);
@@ -173,6 +185,7 @@ void benchmark(const Options& options) {
                       {"map_completeness", e.completeness},
                       {"closures_found", found},
                       {"closures_accepted", accepted},
+                      {"closures_falsified", falsified(built)},
                       {"worst_closure_m", errors.worst_m},
                       {"worst_closure_deg", errors.worst_deg},
                       {"build_s", build_s}});
