@@ -170,7 +170,9 @@ struct JointRefinementConfig {
   double scan_point_weight = 0.1;
   double step_across_share = 0.3;
   double step_heading_share = 0.5;
+  double odometry_sd_per_m = 0.025;
   double offset_sd_per_m = 0.001;
+  double common_offset_sd_per_m = 5.6e-5;
   int rounds = 2;
   int steps = 6;
 
@@ -195,8 +197,13 @@ struct JointRefinementConfig {
     v.number("step_across_share", step_across_share, 0.01, 1, "",
              "A depth camera's steps from keyframe to keyframe are trusted, across the way, to this share of drive/position_sd_per_m, ...");
     v.number("step_heading_share", step_heading_share, 0.01, 1, "", "... and their heading to this share of drive/heading_sd_deg_per_m.");
+    v.number("odometry_sd_per_m", odometry_sd_per_m, 0, 1, "m/m",
+             "How well odometry tells the length of one metre driven (sd), but for a scale that is the same over the drive and is found; grows "
+             "as the root of the distance. 0 = it is not asked.");
     v.number("offset_sd_per_m", offset_sd_per_m, 1e-7, 0.05, "1/m",
              "How wrong a depth camera's disparity may steadily be, column against column (sd; 0.001 is 1 % at 10 m).");
+    v.number("common_offset_sd_per_m", common_offset_sd_per_m, 1e-7, 0.05, "1/m",
+             "The same of all columns alike, which only odometry's constant scale tells from a bent drive.");
     v.integer("rounds", rounds, 1, 100, "", "Times that views are paired anew.");
     v.integer("steps", steps, 1, 100, "", "Steps a round.");
   }

@@ -107,6 +107,41 @@ TEST(JointRefiner, FindsWhatTheCameraIsSteadilyWrongBy) {
   EXPECT_LT(std::sqrt(after), 0.5 * std::sqrt(before));
 }
 
+/// In a corridor, whose walls do not tell how far the robot drove, the mapper's steps are 2 % long in one half and short in the other.
+/// Odometry is 2 % wrong too, but the same everywhere.
+/// @return  how far the middle keyframe is from the middle of the way
+double corridor_middle_error_m(double odometry_sd_per_m, double* before_m) {
+  std::vector<Pose2> truth;
+  for (int i = 0; i <= 640; ++i) truth.push_back({0.025 * i, 0.0, 0.0});
+  const std::vector<Wall> walls = {{{-5.0, 1.2}, {30.0, 1.2}}, {{-5.0, -1.2}, {30.0, -1.2}}};
+  Drive drive = drive_of(walls, truth, {});
+  for (Keyframe& keyframe : drive.keyframes) keyframe.T_odom_base.x_m *= 1.02;
+  PoseGraph graph = bent_graph(drive);
+  Pose2 at;
+  for (PoseGraphEdge& edge : graph.edges) {
+    const bool first_half = drive.keyframes[static_cast<std::size_t>(edge.to)].T_drive_base.x_m < 8.1;
+    edge.T_from_to = {0.5 * (first_half ? 1.02 : 0.98), 0.0, 0.0};
+    at = at * edge.T_from_to;
+    graph.nodes[edge.to] = at;
+  }
+  JointRefinementConfig config;
+  config.odometry_sd_per_m = odometry_sd_per_m;
+  const JointRefinement refined = refine_jointly(config, {drive}, graph, 3.0, [](double) {});
+  EXPECT_TRUE(refined.kept);
+  const std::size_t end = refined.T_map_keyframe.size() - 1;
+  const auto off_m = [&](const std::vector<Pose2>& poses) { return std::fabs(poses[end / 2].x_m - 0.5 * poses[end].x_m); };
+  *before_m = off_m(poses_of(graph));
+  return off_m(refined.T_map_keyframe);
+}
+
+TEST(JointRefiner, OdometryWhoseScaleIsUnknownKeepsHalfADriveFromBeingStretched) {
+  double before_m = 0.0;
+  const double without_m = corridor_middle_error_m(0.0, &before_m);
+  EXPECT_GT(before_m, 0.14) << "2 % of 8 m, or a step more";
+  EXPECT_GT(without_m, 0.9 * before_m) << "the walls do not tell";
+  EXPECT_LT(corridor_middle_error_m(0.005, &before_m), 0.2 * before_m);
+}
+
 TEST(JointRefiner, HeldKeyframesStayToTheBit) {
   const Drive drive = drive_of(ring(), drive_through({{0, 0}, {8, 0}}), {});
   PoseGraph graph = bent_graph(drive);
