@@ -22,6 +22,7 @@ constexpr double kAfter_s = 1.0;
 constexpr double kWatch_s = 0.1;
 constexpr double kCarriedOffAfter_m = 2.0;  ///< or half the way
 constexpr double kSetDownRoom_m = 0.15;
+constexpr double kElsewhere_m = 1.0;
 constexpr double kStands_mps = 0.02, kStands_radps = 0.05;
 
 class GoalDriver {
@@ -76,6 +77,7 @@ class GoalDriver {
       Pose2 T_map_robot;
       if (loop_.stack().estimate(&T_map_robot)) result_.estimate_off_m = distance_m(T_map_robot, T_map_goal);
       result_.true_off_m = distance_m(loop_.simulator().T_world_base(), goal.T_world_goal);
+      result_.doubt_arrival();
     }
     for (const double until_s = loop_.now_s() + kAfter_s; loop_.now_s() < until_s;) {
       const Command& command = step();
@@ -149,6 +151,12 @@ class GoalDriver {
 };
 
 }  // namespace
+
+void GoalResult::doubt_arrival() {
+  if (!reached || true_off_m <= kElsewhere_m) return;
+  reached = false;
+  reason = fmt::format("said that it had arrived, {:.1f} m from the goal.", true_off_m);
+}
 
 GoalRunRecord drive_goals(const SimulatorConfig& simulator, const NavigationStackConfig& stack, const WorldConfig& changed,
                           const MapDirectory& map, const WorldInMap& world_in_map, const SuiteRun& run,

@@ -195,6 +195,17 @@ GoalResult result_of(Expected expected, bool reached, double time_s, double dist
   return r;
 }
 
+TEST(GoalScore, WhoArrivesElsewhereHasNotArrived) {
+  GoalResult far = result_of(Expected::kReached, true, 20.0, 10.0), near = far;
+  near.true_off_m = 0.4;  // what a built map may be off
+  far.true_off_m = 12.2;
+  near.doubt_arrival();
+  far.doubt_arrival();
+  EXPECT_TRUE(near.right());
+  EXPECT_FALSE(far.right());
+  EXPECT_THAT(far.reason, HasSubstr("12.2 m"));
+}
+
 TEST(GoalScore, SpeedIsOfReachedGoalsReversalsOfAllAndKidnapsAreCountedApart) {
   GoalRunResult run;
   run.goals.push_back(result_of(Expected::kReached, true, 20.0, 10.0));
