@@ -14,7 +14,7 @@ namespace knav {
 struct GoalResult {
   SuiteGoal goal;
   bool reached = false;
-  int failure_code = 0;            ///< of NavigationFailure; 0 if it ran out of time
+  int failure_code = 0;            ///< of NavigationFailure; 0 if it ran out of time or arrived elsewhere
   std::string reason;              ///< of those not reached
   double reason_off_m = 0.0;       ///< blocked: from the point it names to the closed door
   double time_s = 0.0, distance_m = 0.0;

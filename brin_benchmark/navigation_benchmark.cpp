@@ -24,7 +24,7 @@ into the map's keepout mask. Further goals have the robot carried off on the way
 OUT receives map/ (of the mapping drive), suite.json (the goals, and each run's changes as a world file has them), run_NN.json,
 .png (truth green, estimate red, crosses where it went wrong), _truth.tum, _estimate.tum, run_NN_GOAL.bag with the 30 s before
 what went wrong, report.json and report.md. What OUT has already is not driven again; --merge puts several buildings together.
-run_NN.json: goals[] with right, reached, failure_code, reason, time_s, distance_m, standing_s, localization (over time_s, without
+run_NN.json: goals[] with right, reached (false if it stands more than 1 m off in truth), failure_code, reason, time_s, distance_m, standing_s, localization (over time_s, without
 5 s after being carried off: ok_s, lost_s, ok_wrong_s, ...), carried_off, noticed_s, right_s (since then, -1 never), estimate_off_m and true_off_m from the goal, turned_round and sways (changes of mind), collisions, walker_contacts.
 report.json: the sums, with the names of report.md.)";
 
@@ -109,7 +109,7 @@ int main(int argc, char** argv) {
   app.add_option("--people", suite.people, "in every run; 0 = 3 to 6")->check(CLI::Range(0, 100))->capture_default_str();
   app.add_option("--run", options.run, "drive only this run, counted from 1; 0 = all")->capture_default_str();
   app.add_option("--jobs", options.jobs, "runs driven at a time")->check(CLI::Range(1, 256))->capture_default_str();
-  app.add_flag("--unchanged", suite.unchanged, "the building is as it was mapped, and nobody walks about");
+  app.add_flag("--unchanged", suite.unchanged, "the building is as it was mapped, and nobody walks about")->excludes("--people");
   app.add_option("--seed", suite.seed, "of goals, changes and all noise")->check(CLI::Range(0, 1000000))->capture_default_str();
   app.add_flag("--quick", options.quick, "one run, four goals and a kidnap");
   app.add_option("--out", options.out, "folder for map, goals, runs and report")->required();

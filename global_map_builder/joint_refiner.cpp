@@ -44,6 +44,7 @@ class Refiner {
       for (std::size_t k = 0; k < drives[d].keyframes.size(); ++k) {
         drive_of_.push_back(static_cast<int>(d));
         path_m_.push_back(before_m + drives[d].keyframes[k].path_m);
+        after_break_.push_back(drives[d].keyframes[k].after_break);
       }
       before_m += drives[d].keyframes.empty() ? 0.0 : drives[d].keyframes.back().path_m + config.min_path_m;
     }
@@ -63,7 +64,7 @@ class Refiner {
       if (edge.robust) continue;
       if (edge.to != edge.from + 1) {
         edge.information *= kAllowed;
-      } else if (views_[static_cast<std::size_t>(edge.to)].depth_camera()) {
+      } else if (const auto to = static_cast<std::size_t>(edge.to); views_[to].depth_camera() && !after_break_[to]) {
         stiffen_step(config, &edge);
       }
     }
@@ -161,6 +162,7 @@ class Refiner {
   std::vector<DriveView> views_;
   std::vector<int> drive_of_;
   std::vector<double> path_m_;
+  std::vector<bool> after_break_;  ///< the step to the keyframe is not the mapper's
   std::vector<Pose2> poses_;
   std::vector<RangeOffset> offset_;
   std::vector<OdometryStep> odometry_;
