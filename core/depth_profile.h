@@ -15,7 +15,7 @@ enum class HeightClass : std::uint8_t {
 };
 
 /// The nearest obstacle per image column, and where the column was really seen free (paper section III.C).
-/// The four vectors have one entry per column. Column u looks along ((u - cx) / fx, 1) in (right, forward),
+/// The vectors have one entry per column, `rows` possibly none at all. Column u looks along ((u - cx) / fx, 1) in (right, forward),
 /// parallel to the floor; all distances are along the forward axis, in metres.
 struct DepthProfile {
   double stamp_s = 0.0;
@@ -27,6 +27,7 @@ struct DepthProfile {
   std::vector<float> free_from_m;  ///< NaN: nothing seen free
   std::vector<float> free_to_m;
   std::vector<HeightClass> height_class;
+  std::vector<std::uint8_t> rows;  ///< of the image that show the obstacle, 255 = that many or more; empty: not known
 };
 
 }  // namespace knav

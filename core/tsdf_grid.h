@@ -11,7 +11,7 @@
 namespace knav {
 
 struct TsdfConfig {
-  double resolution_m = 0.05;
+  double resolution_m = 0.025;
   TruncationConfig truncation;
   double weight_range_floor_m = 0.5;
   int weight_bits = 16;

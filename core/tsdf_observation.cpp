@@ -130,6 +130,7 @@ void observation_from(const DepthProfile& profile, const ObservationLimits& limi
   out->behind_slope = 1.0f / (1.0f - static_cast<float>(limits.truncation.behind_full));
   out->behind_power = limits.truncation.behind_power;
   out->pinhole = true;
+  out->rows = profile.rows;
   out->fx_px = static_cast<float>(profile.fx_px);
   out->cx_px = static_cast<float>(profile.cx_px);
   const auto low = static_cast<float>(limits.range_min_m);
@@ -172,6 +173,7 @@ void observation_from(const RangeScan& scan, const ObservationLimits& limits, Ts
   out->behind_slope = 1.0f / (1.0f - static_cast<float>(limits.truncation.behind_full));
   out->behind_power = limits.truncation.behind_power;
   out->pinhole = false;
+  out->rows.clear();
   out->angle_min_rad = static_cast<float>(scan.angle_min_rad);
   out->angle_increment_rad = static_cast<float>(scan.angle_increment_rad);
   const auto low = static_cast<float>(std::max(limits.range_min_m, scan.range_min_m));

@@ -14,7 +14,7 @@ namespace knav {
 /// distance to the obstacle along the ray"). A Kinect's disparity noise is about 0.0015 r^2.
 struct TruncationConfig {
   double base_m = 0.4;
-  double per_range_squared = 0.003;
+  double per_range_squared = 0.006;
   double limit_m = 2.0;
   double behind_full = 0.3;
   int behind_power = 4;
@@ -75,6 +75,7 @@ struct TsdfObservation {
   /// -1: the surface is a low or a high thing (HeightClass), which leaves the view as the robot drives up to it; 0: not.
   std::vector<std::int32_t> standing;
   bool any_standing = false;
+  std::vector<std::uint8_t> rows;             ///< of the image that show the surface (DepthProfile); empty: not known
   std::vector<float> free_from_m, free_to_m;  ///< carved between these; free_to < free_from: nothing
   /// Between these nothing stands within a margin on either side of the ray.
   std::vector<float> clear_from_m, clear_to_m;

@@ -176,6 +176,11 @@ void ColumnSurface::average(std::vector<float>* z_m) const {
   for (std::size_t u = 0; u < count_.size(); ++u) (*z_m)[u] = count_[u] > 0.0f ? count_[u] / sum_[u] : kNaN;
 }
 
+void ColumnSurface::count_rows(std::vector<std::uint8_t>* rows) const {
+  rows->resize(count_.size());
+  for (std::size_t u = 0; u < count_.size(); ++u) (*rows)[u] = static_cast<std::uint8_t>(std::min(count_[u], 255.0f));
+}
+
 void ColumnSurface::minimum(const cv::Mat& sliced, double range_max_m, std::vector<float>* z_m) {
   z_m->assign(static_cast<std::size_t>(sliced.cols), kInf);
   for (int v = 0; v < sliced.rows; ++v) minimum_row(sliced.ptr<float>(v), sliced.cols, z_m->data());

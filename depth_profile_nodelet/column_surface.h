@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -37,6 +38,8 @@ class ColumnSurface {
 
   /// Mean in inverse depth of the readings in the window [m] of what was found or taken over; NaN: no surface.
   void average(std::vector<float>* z_m) const;
+  /// How many readings of each column lie in that window; 255: that many or more.
+  void count_rows(std::vector<std::uint8_t>* rows) const;
   /// The plain minimum of each column (paper).
   static void minimum(const cv::Mat& sliced, double range_max_m, std::vector<float>* z_m);
 

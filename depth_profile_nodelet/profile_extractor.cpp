@@ -29,6 +29,7 @@ void ProfileExtractor::extract(const cv::Mat& sliced, const PinholeModel& camera
   profile->range_max_m = config_.range_max_m;
   if (config_.method == "paper") {
     ColumnSurface::minimum(sliced, config_.range_max_m, &profile->z_m);
+    profile->rows.clear();
   } else {
     if (found && found->finds_the_same(surface_)) {
       surface_.take(*found);
@@ -36,6 +37,7 @@ void ProfileExtractor::extract(const cv::Mat& sliced, const PinholeModel& camera
       surface_.find(sliced, camera.fy_px);
     }
     surface_.average(&profile->z_m);
+    surface_.count_rows(&profile->rows);
   }
   smooth(&profile->z_m);
 

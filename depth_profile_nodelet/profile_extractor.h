@@ -52,7 +52,7 @@ class ProfileExtractor {
   explicit ProfileExtractor(const DepthProfileConfig& config);
 
   /// @param sliced  levelled image of FloorRemover: 32FC1 m, NaN invalid
-  /// @param profile z is written; free_from, free_to and height_class are taken from the floor (one entry a
+  /// @param profile z and rows are written (`paper`: no rows); free_from, free_to and height_class are taken from the floor (one entry a
   /// column) and
   ///                made to agree with z
   /// @param found   what ColumnSurface::find() found in this very image, if somebody has it: saves finding it

@@ -67,8 +67,8 @@ PinholeModel pinhole_from(const sensor_msgs::CameraInfo& info) {
 void profile_from(const kinect_nav::DepthProfile& message, DepthProfile* profile) {
   const std::size_t columns = message.z.size();
   if (message.free_from.size() != columns || message.free_to.size() != columns ||
-      message.height_class.size() != columns) {
-    throw UserError("depth profile: z, free_from, free_to and height_class must have the same length.");
+      message.height_class.size() != columns || (!message.rows.empty() && message.rows.size() != columns)) {
+    throw UserError("depth profile: z, free_from, free_to, height_class and, unless it is empty, rows must have the same length.");
   }
   profile->stamp_s = message.header.stamp.toSec();
   profile->fx_px = message.fx;
@@ -82,6 +82,7 @@ void profile_from(const kinect_nav::DepthProfile& message, DepthProfile* profile
   for (std::size_t i = 0; i < columns; ++i) {
     profile->height_class[i] = static_cast<HeightClass>(message.height_class[i]);
   }
+  profile->rows = message.rows;
 }
 
 void profile_message(const DepthProfile& profile, kinect_nav::DepthProfile* message) {
@@ -97,6 +98,7 @@ void profile_message(const DepthProfile& profile, kinect_nav::DepthProfile* mess
   for (std::size_t i = 0; i < profile.height_class.size(); ++i) {
     message->height_class[i] = static_cast<std::uint8_t>(profile.height_class[i]);
   }
+  message->rows = profile.rows;
 }
 
 void distance_map_message(const DistanceMap& map, kinect_nav::DistanceMap* message) {

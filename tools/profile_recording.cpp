@@ -11,7 +11,7 @@
 namespace knav {
 namespace {
 
-constexpr char kMagic[8] = {'k', 'n', 'a', 'v', 'p', 'r', 'o', '1'};
+constexpr char kMagic[8] = {'k', 'n', 'a', 'v', 'p', 'r', 'o', '2'};
 constexpr float kStep_m = 0.0005f;
 constexpr std::uint16_t kNothing = 65535;  ///< NaN of a profile, +Inf of a scan
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -40,6 +40,7 @@ void ProfileRecording::add(const DepthProfile& profile) {
     free_from_.push_back(packed(profile.free_from_m[u]));
     free_to_.push_back(packed(profile.free_to_m[u]));
     height_class_.push_back(static_cast<std::uint8_t>(profile.height_class[u]));
+    rows_.push_back(u < profile.rows.size() ? profile.rows[u] : 255);
   }
 }
 
@@ -60,11 +61,13 @@ void ProfileRecording::profile(std::size_t i, DepthProfile* profile) const {
   profile->free_from_m.resize(columns_);
   profile->free_to_m.resize(columns_);
   profile->height_class.resize(columns_);
+  profile->rows.resize(columns_);
   for (std::size_t u = 0, k = i * columns_; u < columns_; ++u, ++k) {
     profile->z_m[u] = unpacked(z_[k]);
     profile->free_from_m[u] = unpacked(free_from_[k]);
     profile->free_to_m[u] = unpacked(free_to_[k]);
     profile->height_class[u] = static_cast<HeightClass>(height_class_[k]);
+    profile->rows[u] = rows_[k];
   }
 }
 
@@ -94,6 +97,7 @@ void ProfileRecording::save(const std::string& path) const {
     write(out, free_from_);
     write(out, free_to_);
     write(out, height_class_);
+    write(out, rows_);
     write(out, static_cast<std::uint64_t>(perfect_scans.size()));
     for (const PerfectScan& scan : perfect_scans) {
       write(out, static_cast<std::uint64_t>(scan.frame));
@@ -121,6 +125,7 @@ ProfileRecording ProfileRecording::load(const std::string& path) {
   read(in, &r.free_from_);
   read(in, &r.free_to_);
   read(in, &r.height_class_);
+  read(in, &r.rows_);
   std::uint64_t scans = 0;
   read(in, &scans);
   for (std::uint64_t i = 0; in && i < scans; ++i) {
@@ -132,7 +137,7 @@ ProfileRecording ProfileRecording::load(const std::string& path) {
     r.perfect_scans.push_back(std::move(scan));
   }
   const std::size_t values = r.stamp_s_.size() * r.columns_;
-  if (!in || r.z_.size() != values || r.height_class_.size() != values || r.free_from_.size() != values ||
+  if (!in || r.z_.size() != values || r.height_class_.size() != values || r.rows_.size() != values || r.free_from_.size() != values ||
       r.free_to_.size() != values) {
     throw UserError(path + ": is cut short or damaged; delete it, and it will be made again.");
   }

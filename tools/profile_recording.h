@@ -44,7 +44,7 @@ class ProfileRecording {
   std::uint64_t columns_ = 0;
   std::vector<double> stamp_s_;
   std::vector<std::uint16_t> z_, free_from_, free_to_;  ///< frame by frame
-  std::vector<std::uint8_t> height_class_;
+  std::vector<std::uint8_t> height_class_, rows_;
 };
 
 }  // namespace knav

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Raised whenever simulator or front end come to give other profiles from the same parameters.
-constexpr int kGeneration = 2;
+constexpr int kGeneration = 3;
 constexpr double kOdometryRate_hz = 50.0;
 constexpr std::uint64_t kFramesPerPerfectScan = 30;
 

@@ -24,8 +24,9 @@ struct FilterConfig {
   double paper_temperature = 0.02;
   double unknown_price = 0.6;
   int refinements = 0;
-  double depth_trust_m = 3.0;
-  double evidence_period_s = 0.3;
+  double depth_trust_m = 5.0;
+  int thin_rows = 16;
+  double evidence_period_s = 0.2;
   double moving_range_m = 2.5;
 
   template <class Visitor>
@@ -50,6 +51,9 @@ struct FilterConfig {
              "DepthProfile: at this range a reading of a surface seen square counts half, beyond less with the range "
              "squared, as a depth camera's steady errors along the ray grow; at a sharp angle they do not matter. 0 = all "
              "count the same.");
+    v.integer("thin_rows", thin_rows, 0, 255, "rows",
+              "DepthProfile: a surface that fewer rows of the image show (a table's edge, a chair's seat) has no say: from a little farther off "
+              "it was not seen at all, but what is behind it. 0 = all have.");
     v.number("evidence_period_s", evidence_period_s, 0, 10, "s",
              "Frames closer together than this share errors, and so count by the share of it that has "
              "passed; 0 = every frame "

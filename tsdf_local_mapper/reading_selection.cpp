@@ -19,7 +19,9 @@ constexpr std::size_t kSurfaceColumns = 6;  ///< to either side of a reading, wh
 /// a far wall seen square they pull the robot along as it drives up to it; on one seen at a sharp angle they move the
 /// reading along the wall, which changes nothing, and that is where the heading comes from.
 float ReadingSelection::weight_of(const TsdfObservation& o, std::size_t column) const {
-  if (!o.pinhole || config_.depth_trust_m <= 0.0) return 1.0f;
+  if (!o.pinhole) return 1.0f;
+  if (!o.rows.empty() && o.rows[column] < config_.thin_rows) return 0.0f;
+  if (config_.depth_trust_m <= 0.0) return 1.0f;
   float across = 1.0f;  // sine of the angle between ray and surface
   if (column >= kSurfaceColumns && column + kSurfaceColumns < o.columns()) {
     const std::size_t left = column - kSurfaceColumns, right = column + kSurfaceColumns;

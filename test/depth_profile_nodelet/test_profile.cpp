@@ -96,6 +96,23 @@ TEST(DepthProfile, TheNearestSupportedSurfaceWinsOverALargerOneBehind) {
   for (const float z : extract(sliced).z_m) ASSERT_NEAR(z, 1.7f, 0.001f);
 }
 
+TEST(DepthProfile, SaysHowManyRowsShowTheObstacle) {
+  cv::Mat sliced(480, 640, CV_32FC1, cv::Scalar(kNaN));
+  sliced.rowRange(0, 400).setTo(5.0f);
+  sliced(cv::Range(403, 406), cv::Range(0, 320)).setTo(1.7f);
+  sliced(cv::Range(403, 443), cv::Range(320, 600)).setTo(1.7f);
+  sliced.colRange(639, 640).setTo(kNaN);
+  const DepthProfile profile = extract(sliced);
+  ASSERT_EQ(profile.rows.size(), 640u);
+  EXPECT_EQ(profile.rows[100], 3);
+  EXPECT_EQ(profile.rows[400], 40);
+  EXPECT_EQ(profile.rows[620], 255) << "400, and a byte holds 255";
+  EXPECT_EQ(profile.rows[639], 0);
+  DepthProfileConfig paper;
+  paper.method = "paper";
+  EXPECT_TRUE(extract(sliced, paper).rows.empty());
+}
+
 TEST(DepthProfile, NothingBeyondTwentyMetresIsReported) {
   cv::Mat sliced(480, 640, CV_32FC1, cv::Scalar(20.5f));
   const DepthProfile profile = extract(sliced);
