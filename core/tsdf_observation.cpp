@@ -25,7 +25,7 @@ void resize(std::size_t columns, TsdfObservation* out) {
 
 void set_truncation(const TruncationConfig& truncation, std::size_t i, TsdfObservation* out) {
   const float r = out->range_m[i];
-  out->truncation_m[i] = std::isnan(r) ? 0.0f : truncation.at(r);
+  out->truncation_m[i] = std::isnan(r) ? 0.0f : truncation.at(r, !out->pinhole);
   out->inverse_truncation_per_m[i] = std::isnan(r) ? 0.0f : 1.0f / out->truncation_m[i];
 }
 

@@ -13,7 +13,7 @@ namespace knav {
 /// does: mu(r) = base + per_range_squared r^2, at most `limit` (paper section III.D: "scaled with the
 /// distance to the obstacle along the ray"). A Kinect's disparity noise is about 0.0015 r^2.
 struct TruncationConfig {
-  double base_m = 0.4;
+  double base_m = 0.25;
   double per_range_squared = 0.006;
   double limit_m = 2.0;
   double behind_full = 0.3;
@@ -21,10 +21,11 @@ struct TruncationConfig {
   double edge_width_m = 0.15;
   double edge_behind = 0.25;
   double cut_front = 0.125;
+  double scan_base_m = 0.4;
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.number("base_m", base_m, 0.05, 5, "m", "Truncation at range 0.");
+    v.number("base_m", base_m, 0.05, 5, "m", "DepthProfile: truncation at range 0.");
     v.number("per_range_squared", per_range_squared, 0, 0.1, "1/m", "Its growth with the range squared.");
     v.number("limit_m", limit_m, 0.05, 10, "m", "Its largest value.");
     v.number(
@@ -41,9 +42,11 @@ struct TruncationConfig {
     v.number("cut_front", cut_front, 0, 1, "",
              "DepthProfile: of a low thing before which no floor was seen the view's lower edge may have cut the front away: before what is "
              "seen of it the reading counts for this share of the truncation only. 1 = all of it (the paper's).");
+    v.number("scan_base_m", scan_base_m, 0.05, 5, "m",
+             "LaserScan: truncation at range 0. Scans come seldom and see far, so that hypotheses lie farther apart, and F has to slope as far.");
   }
-  float at(float range_m) const {
-    const float mu = static_cast<float>(base_m) + static_cast<float>(per_range_squared) * range_m * range_m;
+  float at(float range_m, bool scan = false) const {
+    const float mu = static_cast<float>(scan ? scan_base_m : base_m) + static_cast<float>(per_range_squared) * range_m * range_m;
     const auto limit = static_cast<float>(limit_m);
     return mu < limit ? mu : limit;
   }

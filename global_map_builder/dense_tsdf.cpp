@@ -92,7 +92,7 @@ void project_angular(const RowProjection& p, int count, std::int32_t* column, fl
 ObservationLimits SurfaceConfig::limits() const {
   ObservationLimits limits;
   limits.range_max_m = range_max_m;
-  limits.truncation.base_m = front_m;
+  limits.truncation.base_m = limits.truncation.scan_base_m = front_m;
   limits.truncation.per_range_squared = per_range_squared;
   limits.truncation.limit_m = 10.0;
   return limits;

@@ -12,7 +12,6 @@ constexpr int kReach_bins = 5;         // neighbours on either side that a norma
 constexpr double kMinBaseline_m = 0.1;  // of a normal
 constexpr double kNormal_sd_m = 0.005;   // whatever the angle
 constexpr double kRangeMin_m = 0.3, kRangeMax_m = 20.0;
-constexpr int kThinRows = 16;            // of the image; what fewer show was not seen at all from a little farther off
 constexpr double kMerge_s = 5.0;         // frames farther apart in time are not averaged
 constexpr double kSameSurface_sd = 3.0;  // a reading farther off than so many standard deviations is of another surface
 
@@ -55,10 +54,9 @@ void DriveView::fill(const DepthProfile& profile) {
     ViewPoint& point = points_.emplace_back();
     z.clear();
     for (std::size_t u = first; u < first + width; ++u) {
-      // Low, high and thin things look different from every distance; walls do not.
+      // Low and high things look different from every distance; walls do not.
       const bool middle = profile.height_class.size() != columns || profile.height_class[u] == HeightClass::kMiddle;
-      const bool thin = profile.rows.size() == columns && profile.rows[u] < kThinRows;
-      if (middle && !thin && profile.z_m[u] > 0.0f) z.push_back(profile.z_m[u]);
+      if (middle && profile.z_m[u] > 0.0f) z.push_back(profile.z_m[u]);
     }
     const double column = static_cast<double>(first) + 0.5 * (bin_columns_ - 1.0);
     point.column_share = (column + 0.5) / static_cast<double>(columns);

@@ -18,7 +18,6 @@ namespace {
 constexpr char kMagic[8] = {'k', 'n', 'a', 'v', 'd', 'r', 'v', 's'};
 constexpr std::uint32_t kVersion = 1;
 constexpr std::uint16_t kNone = 0xFFFF, kInfinite = 0xFFFE, kLargest = 0xFFFD;
-constexpr int kMostRows = 63;  ///< of an obstacle; they share a byte with its height class
 constexpr double kFinest_m = 0.001;
 constexpr std::uint64_t kMaxBytes = std::uint64_t{8} << 30;
 
@@ -150,23 +149,11 @@ void profile(Archive& a, DepthProfile& p) {
   lengths(a, p.z_m, unit_m);
   lengths(a, p.free_from_m, unit_m);
   lengths(a, p.free_to_m, unit_m);
-  if constexpr (Archive::kReading) p.rows.clear();
-  std::size_t column = 0;
   list(a, p.height_class, [&](HeightClass& h) {
     auto code = static_cast<std::uint8_t>(h == HeightClass::kBlind ? HeightClass::kNone : h);
-    if constexpr (!Archive::kReading) {
-      if (!p.rows.empty()) code = static_cast<std::uint8_t>(code | std::clamp<int>(p.rows[column++], 1, kMostRows) << 2);
-    }
     a.plain(code);
     h = static_cast<HeightClass>(code & 3);
-    // Maps of before rows were counted have none.
-    if constexpr (Archive::kReading) {
-      if (code >> 2 > 0) p.rows.push_back(static_cast<std::uint8_t>(code >> 2));
-    }
   });
-  if constexpr (Archive::kReading) {
-    if (p.rows.size() != p.height_class.size()) p.rows.clear();
-  }
 }
 
 template <class Archive>

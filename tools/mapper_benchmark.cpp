@@ -22,7 +22,7 @@ constexpr char kHelp[] =
     "trajectory and virtual scan with the truth. Rows of the table:\n"
     "  ideal       a depth camera without faults: what the method alone costs\n"
     "  calibrated  a Kinect after calibration, odometry a few per cent wrong\n"
-    "  driven      the same, by a robot that learns its camera's errors and begins with what another drive taught\n"
+    "  driven      the same, but the robot begins with what another drive taught of its camera\n"
     "  default     a Kinect as bought, uncalibrated: up to 10 % wrong at 10 m\n"
     "  harsh       a bad one, uncalibrated: up to 16 %\n"
     "  paper       as calibrated, the local mapper as in --paper-config\n"
@@ -39,7 +39,7 @@ worst_to_mean_20_m. lost: some 20 m segment is more than 2 m off. scan: rays wit
 8 m; a false obstacle is a return 0.3 m and 5 % nearer than anything within 0.1 m beside its ray.)";
 
 struct Options {
-  std::string worlds = "config/worlds", cache, config, paper_config = "config/paper_literal.yaml", json, trajectories;
+  std::string worlds = "config/worlds", cache, config = "config/simulated_robot.yaml", paper_config = "config/paper_literal.yaml", json, trajectories;
   std::vector<std::string> rows = {"calibrated", "driven", "harsh", "paper", "people"};
   int seeds = 10, first_seed = 1, mapper_seed = -1;
   bool quick = false, fresh = false, record_only = false, no_scans = false;
@@ -258,7 +258,8 @@ int main(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_option("--mapper-seed", options.mapper_seed, "Seed of the mapper; otherwise that of the drive");
-  app.add_option("--config", options.config, "Configuration file; its front end and 'local_mapper' are used");
+  app.add_option("--config", options.config, "Configuration file; its front end and 'local_mapper' are used")
+      ->capture_default_str();
   app.add_option("--paper-config", options.paper_config, "The same of the row 'paper'; only 'local_mapper' is used")
       ->capture_default_str();
   app.add_option("--worlds", options.worlds,

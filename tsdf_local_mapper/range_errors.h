@@ -17,7 +17,7 @@ namespace knav {
 
 /// What may be steadily wrong with a depth camera's columns.
 struct RangeErrorsConfig {
-  bool learn = false;
+  bool learn = true;
   int bands = 40;
   double offset_sd_per_m = 0.0006;
   double memory_m = 3000.0;

@@ -58,6 +58,8 @@ TEST(TsdfGrid, TruncationGrowsWithRange) {
   EXPECT_FLOAT_EQ(truncation.at(10.0f), 0.7f);
   EXPECT_FLOAT_EQ(truncation.at(20.0f), 1.6f);
   EXPECT_FLOAT_EQ(truncation.at(30.0f), 2.0f);  // its limit
+  truncation.scan_base_m = 0.5;
+  EXPECT_FLOAT_EQ(truncation.at(10.0f, true), 0.8f) << "a scan's";
 }
 
 TEST(TsdfGrid, NoSpurStandsOutOfTheFarCornerOfAThing) {

@@ -15,7 +15,7 @@ inline constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 inline TsdfConfig fixed_truncation(double mu_m) {
   TsdfConfig config;
   config.resolution_m = 0.05;  // the tests count in cells of 5 cm
-  config.truncation = {mu_m, 0.0, mu_m, 0.0, 0, 0.0, 1.0};  // the paper's
+  config.truncation = {mu_m, 0.0, mu_m, 0.0, 0, 0.0, 1.0, 1.0, mu_m};  // the paper's
   return config;
 }
 

@@ -178,31 +178,6 @@ TEST(MapRecord, ReadsBackWhatWasWrittenToAMillimetre) {
   EXPECT_THROW(read_map_record(path), UserError) << "cut off";
 }
 
-TEST(MapRecord, KeepsHowManyRowsShowAnObstacleUpTo63) {
-  MapRecord record;
-  Drive& drive = record.drives.emplace_back();
-  drive.keyframes.emplace_back();
-  record.T_map_keyframe.emplace_back();
-  for (const bool counted : {true, false}) {
-    DepthProfile profile;
-    for (const int rows : {0, 3, 63, 200}) {
-      profile.z_m.push_back(2.0f);
-      profile.free_from_m.push_back(1.0f);
-      profile.free_to_m.push_back(2.0f);
-      profile.height_class.push_back(HeightClass::kHigh);
-      if (counted) profile.rows.push_back(static_cast<std::uint8_t>(rows));
-    }
-    drive.frames.emplace_back().data = profile;
-  }
-  const std::string path = ::testing::TempDir() + "knav_rows.bin";
-  write_map_record(path, record);
-  const MapRecord again = read_map_record(path);
-  const auto& counted = std::get<DepthProfile>(again.drives[0].frames[0].data);
-  EXPECT_EQ(counted.rows, (std::vector<std::uint8_t>{1, 3, 63, 63}));
-  EXPECT_EQ(counted.height_class, std::vector<HeightClass>(4, HeightClass::kHigh));
-  EXPECT_TRUE(std::get<DepthProfile>(again.drives[0].frames[1].data).rows.empty());
-}
-
 TEST(MapRecord, ScansKeepInfinityAndFarReadings) {
   MapRecord record;
   Drive& drive = record.drives.emplace_back();
