@@ -55,6 +55,7 @@ struct MeasurementConfig {
 struct HealthConfig {
   double explained_m = 0.05;
   double explained_per_range = 0.012;
+  double full_range_m = 3.0;
   double ok_fraction = 0.60;
   double fresh_ok_fraction = 0.60;
   double lost_fraction = 0.40;
@@ -71,6 +72,9 @@ struct HealthConfig {
              "A reading this near to a wall of the map is explained by it, ...");
     v.number("explained_per_range", explained_per_range, 0, 0.5, "m/m",
              "... plus this much per metre of range.");
+    v.number("full_range_m", full_range_m, 0, 100, "m",
+             "A ray shorter than this counts in proportion to its length: half of all rays may meet one thing beside the robot, which was moved "
+             "there or taken away. 0 = all count the same.");
     v.number("ok_fraction", ok_fraction, 0, 1, "",
              "Smoothed fraction of explained rays below which the verdict is no longer ok.");
     v.number("fresh_ok_fraction", fresh_ok_fraction, 0, 1, "",

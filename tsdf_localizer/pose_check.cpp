@@ -31,9 +31,9 @@ bool meets_wall(const DistanceMap& map, const Point2& from, const Point2& to, do
 
 }  // namespace
 
-double support_of(std::uint32_t explained, std::uint32_t in_front, std::uint32_t through) {
-  const std::uint32_t judged = explained + in_front + through;
-  return judged > 0 ? (explained + 0.5 * in_front) / judged : 1.0;
+double support_of(double explained, double in_front, double through) {
+  const double judged = explained + in_front + through;
+  return judged > 0.0 ? (explained + 0.5 * in_front) / judged : 1.0;
 }
 
 PoseCheck check_pose(const DistanceMap& map, const ScanRays& rays, const Pose2& T_map_base,
@@ -42,7 +42,9 @@ PoseCheck check_pose(const DistanceMap& map, const ScanRays& rays, const Pose2& 
   const Pose2 T_map_sensor = T_map_base * rays.T_base_sensor;
   const Point2 from{T_map_sensor.x_m, T_map_sensor.y_m};
   const double c = std::cos(T_map_base.yaw_rad), s = std::sin(T_map_base.yaw_rad);
-  std::uint32_t fresh_explained = 0, fresh_in_front = 0, fresh_through = 0;
+  enum Kind { kExplained, kInFront, kThrough, kUnknown };
+  double all[4] = {}, fresh[4] = {};  // what the rays of each kind count
+  std::uint32_t fresh_rays = 0;
   double cost = 0.0, weight = 0.0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const double px = rays.points.x_m[i], py = rays.points.y_m[i], range_m = rays.range_m[i];
@@ -52,34 +54,38 @@ PoseCheck check_pose(const DistanceMap& map, const ScanRays& rays, const Pose2& 
     // a glancing ray meets a wall long before its end though the pose is only a little off: hence slack with
     // range
     const bool through = meets_wall(map, from, to, range_m, 2.0 * health.explained_m + 0.1 * range_m);
-    const bool fresh = rays.evidence[i] >= kFreshEvidence;
     double price = measurement.unknown_cost;
+    Kind kind = kUnknown;
     if (through && distance_m <= near_m) {
       // It ends on a wall of the map behind something that the map has as well: that was taken away. A wrong pose would need
       // luck for this. As good a sign as something that stands before a wall.
       price = 0.5;
+      kind = kInFront;
       ++check.in_front;
-      fresh_in_front += fresh;
     } else if (through) {
       price = 1.0;
+      kind = kThrough;
       ++check.through;
-      fresh_through += fresh;
     } else if (!std::isfinite(distance_m)) {
       ++check.unknown;
     } else {
       price = std::min(1.0, distance_m / measurement.truncation_m);
       const bool explained = distance_m <= near_m;
+      kind = explained ? kExplained : kInFront;
       (explained ? check.explained : check.in_front) += 1;
-      if (fresh) (explained ? fresh_explained : fresh_in_front) += 1;
     }
-    cost += rays.points.weight[i] * price;
-    weight += rays.points.weight[i];
+    const double counts = range_m < health.full_range_m ? range_m / health.full_range_m : 1.0;
+    all[kind] += counts;
+    if (rays.evidence[i] >= kFreshEvidence && kind != kUnknown) {
+      fresh[kind] += counts;
+      ++fresh_rays;
+    }
+    cost += counts * rays.points.weight[i] * price;
+    weight += counts * rays.points.weight[i];
   }
   if (weight > 0.0) check.cost = cost / weight;
-  check.support = support_of(check.explained, check.in_front, check.through);
-  if (fresh_explained + fresh_in_front + fresh_through >= kFreshRaysMin) {
-    check.fresh_support = support_of(fresh_explained, fresh_in_front, fresh_through);
-  }
+  check.support = support_of(all[kExplained], all[kInFront], all[kThrough]);
+  if (fresh_rays >= kFreshRaysMin) check.fresh_support = support_of(fresh[kExplained], fresh[kInFront], fresh[kThrough]);
   return check;
 }
 

@@ -27,8 +27,8 @@ struct PoseCheck {
 
 /// (explained + in_front / 2) / judged: what stands in front of a wall speaks less against a pose than a look
 /// through it, so a crowd (all in_front) scores higher than a wrong pose (as much through as in_front). 1 if
-/// nothing is judged.
-double support_of(std::uint32_t explained, std::uint32_t in_front, std::uint32_t through);
+/// nothing is judged. Of rays, or of what they count (HealthConfig::full_range_m).
+double support_of(double explained, double in_front, double through);
 
 PoseCheck check_pose(const DistanceMap& map, const ScanRays& rays, const Pose2& T_map_base,
                      const MeasurementConfig& measurement, const HealthConfig& health);
