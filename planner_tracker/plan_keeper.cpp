@@ -13,7 +13,7 @@ constexpr double kOffPath_m = 0.5;
 constexpr double kBeginning_m = 0.5;  ///< of a path, for its direction
 constexpr double kUnhurried = 1.5;  ///< times as long as at full speed
 constexpr double kMovesThere_m = 1.0;   ///< of where the way is closed
-constexpr double kNoWayRound_m = 100.0;  ///< that far is as good as none: a way that was found closed a moment ago
+constexpr double kNoWayRound_m = 40.0;  ///< so far is a way round that was found closed a moment ago: in a crowd it may be open again soon
 constexpr double kWalkedThere_m = 1.5;  ///< who closes it has walked past so near to there
 constexpr double kWider_m = 0.05;      ///< a way once found closed must be wider by this on either side to turn back for
 
