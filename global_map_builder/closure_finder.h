@@ -95,6 +95,7 @@ class ClosureFinder {
   Location verify(const Hypothesis& hypothesis, const std::vector<int>& places,
                   const std::vector<int>& asked) const;
   std::vector<Hypothesis> distinct(const std::vector<Hypothesis>& found) const;
+  std::vector<Hypothesis> most_central_first(const std::vector<Hypothesis>& agreeing) const;
   void judge_location(int drive, std::size_t found, const std::vector<Location>& locations);
   void move_drive(int drive, const Pose2& T_map_drive);
   bool agree(const Hypothesis& h, const Hypothesis& with) const;

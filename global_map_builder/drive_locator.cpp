@@ -179,6 +179,26 @@ std::vector<ClosureFinder::Hypothesis> ClosureFinder::distinct(const std::vector
   return out;
 }
 
+/// In order of how far they part from the middle one of the others. A look-alike may agree as far as the drive may have drifted.
+std::vector<ClosureFinder::Hypothesis> ClosureFinder::most_central_first(const std::vector<Hypothesis>& agreeing) const {
+  std::vector<std::pair<double, const Hypothesis*>> ranked;
+  std::vector<double> apart;
+  for (const Hypothesis& h : agreeing) {
+    const Pose2 here = graph_.nodes.at(h.to);
+    apart.clear();
+    for (const Hypothesis& other : agreeing) {
+      apart.push_back(distance_m(h.T_map_drive * here, other.T_map_drive * here));
+    }
+    const auto middle = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 2);
+    std::nth_element(apart.begin(), middle, apart.end());
+    ranked.emplace_back(*middle, &h);
+  }
+  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<Hypothesis> out;
+  for (const auto& [apart_m, h] : ranked) out.push_back(*h);
+  return out;
+}
+
 void ClosureFinder::judge_location(int drive, std::size_t found, const std::vector<Location>& locations) {
   const Location best = locations.empty() ? Location{} : locations[0];
   const int agreeing = static_cast<int>(best.agreeing.size());
@@ -206,7 +226,8 @@ void ClosureFinder::judge_location(int drive, std::size_t found, const std::vect
                     config_.closures.locate_agreeing, best.contradicting, 100.0 * best.astray, rival));
   }
   move_drive(drive, best.T_map_drive);
-  for (const Hypothesis& h : best.agreeing) {
+  // The first one joined bends nothing, whatever it says, and the others are held against it.
+  for (const Hypothesis& h : most_central_first(best.agreeing)) {
     Closure closure;
     closure.from = h.from;
     closure.to = h.to;

@@ -42,7 +42,7 @@ class AlignmentTest : public ::testing::Test {
 TEST_F(AlignmentTest, ZeroOnTheSurfaceAndLinearAwayFromIt) {
   EXPECT_LT(cost_at({0, 0, 0}), 0.01f);
   // 0.1 m off the wall with mu = base: |F| = 0.1 / mu(2.0 ... 2.2 m).
-  const float mu = config_.truncation.at(2.05f);
+  const float mu = config_.truncation.at(2.05f, true);
   EXPECT_NEAR(cost_at({-0.1, 0, 0}), 0.1f / mu, 0.02f);
   EXPECT_NEAR(cost_at({0.1, 0, 0}), 0.1f / mu, 0.02f);
 }
