@@ -23,10 +23,18 @@ Eigen::Matrix3d step_covariance(const DriveConfig& config, double path_m, double
   return Eigen::Vector3d(position * position, position * position, heading * heading).asDiagonal();
 }
 
+/// The joint fit finds the camera's steady errors itself, from all views as they are; and thin things tell places of a drive apart
+/// that are seen twice from the same distance (docs/mapping.md has what each costs).
+LocalMapperConfig for_mapping(LocalMapperConfig mapper) {
+  mapper.range_errors.learn = false;
+  mapper.filter.thin_rows = 0;
+  return mapper;
+}
+
 }  // namespace
 
 DriveRecorder::DriveRecorder(const DriveConfig& config, const LocalMapperConfig& mapper)
-    : config_(config), mapper_(mapper) {}
+    : config_(config), mapper_(for_mapping(mapper)) {}
 
 template <class Observation>
 void DriveRecorder::take(const Observation& observation, const Pose2& T_base_sensor) {
