@@ -10,7 +10,7 @@
 namespace knav {
 
 /// How the truncation of the signed distance grows with the range r of the surface, as the sensor's noise
-/// does: mu(r) = base + per_range_squared r^2, at most `limit` (paper section III.D: "scaled with the
+/// does: mu(r) = base (a scan: scan_base) + per_range_squared r^2, at most `limit` (paper section III.D: "scaled with the
 /// distance to the obstacle along the ray"). A Kinect's disparity noise is about 0.0015 r^2.
 struct TruncationConfig {
   double base_m = 0.25;

@@ -23,8 +23,7 @@ Eigen::Matrix3d step_covariance(const DriveConfig& config, double path_m, double
   return Eigen::Vector3d(position * position, position * position, heading * heading).asDiagonal();
 }
 
-/// The joint fit finds the camera's steady errors itself, from all views as they are; and thin things tell places of a drive apart
-/// that are seen twice from the same distance (docs/mapping.md has what each costs).
+/// Maps come out better so, in three drives (docs/mapping.md has the figures; both parameters' descriptions say it).
 LocalMapperConfig for_mapping(LocalMapperConfig mapper) {
   mapper.range_errors.learn = false;
   mapper.filter.thin_rows = 0;

@@ -53,7 +53,7 @@ struct FilterConfig {
              "count the same.");
     v.integer("thin_rows", thin_rows, 0, 255, "rows",
               "DepthProfile: a surface that fewer rows of the image show (a table's edge, a chair's seat) has no say: from a little farther off "
-              "it was not seen at all, but what is behind it. 0 = all have.");
+              "it was not seen at all, but what is behind it. 0 = all have, and so in build_map always.");
     v.number("evidence_period_s", evidence_period_s, 0, 10, "s",
              "Frames closer together than this share errors, and so count by the share of it that has "
              "passed; 0 = every frame "

@@ -26,7 +26,7 @@ struct RangeErrorsConfig {
   void visit(Visitor& v) {
     v.flag("learn", learn,
            "DepthProfile: learn what is steadily wrong with the columns' depth, from surfaces that were seen from afar and "
-           "later from nearer, and take it out.");
+           "later from nearer, and take it out. Never in build_map.");
     v.integer("bands", bands, 2, 320, "", "Places across the image at which it is estimated; linear in between.");
     v.number("offset_sd_per_m", offset_sd_per_m, 1e-6, 0.02, "1/m",
              "How wrong the inverse depth may be (sd): 0.0006 is 0.6 % at 10 m.");
