@@ -206,9 +206,9 @@ void tsdf_paper_costs(const TsdfGrid& grid, const WeightedPoints& points, const 
       const int ix = grid.cell_of(T.x_m + c * x - s * y), iy = grid.cell_of(T.y_m + s * x + c * y);
       if (!grid.contains(ix, iy)) continue;
       const std::size_t cell = grid.index(ix, iy);
-      sum += std::fabs(static_cast<double>(grid.weighted_sums()[cell]));
-      if (grid.weights()[cell] > 0) {
-        weight_sum += grid.weights()[cell];
+      sum += std::fabs(static_cast<double>(grid.weighted_sum_units(cell)));
+      if (grid.weight_units(cell) > 0) {
+        weight_sum += grid.weight_units(cell);
         known += 1.0;
       }
     }

@@ -75,7 +75,7 @@ void project_row_angular(const RowProjection& p, int first, int count, std::int3
 /// The directions of the view's edges, a column wider than it is.
 class View {
  public:
-  explicit View(const TsdfObservation& o) : reach_m_(o.reach_m) {
+  explicit View(const TsdfObservation& o) {
     const double columns = static_cast<double>(o.columns());
     double first, last;
     if (o.pinhole) {
@@ -95,9 +95,9 @@ class View {
     left_y_ = std::sin(left);
   }
 
-  /// The part of the row at height dy over the sensor that lies in the disc of its reach and in its view.
-  bool span(double dy, double* low, double* high) const {
-    const double square = reach_m_ * reach_m_ - dy * dy;
+  /// The part of the row at height dy over the sensor that lies within a distance and in its view.
+  bool span(double dy, double within_m, double* low, double* high) const {
+    const double square = within_m * within_m - dy * dy;
     if (square <= 0.0) return false;
     *high = std::sqrt(square);
     *low = -*high;
@@ -134,7 +134,6 @@ class View {
     return span;
   }
 
-  double reach_m_;
   bool all_round_, narrow_;
   double right_x_, right_y_, left_x_, left_y_;
 };
@@ -175,7 +174,7 @@ TsdfGrid::TsdfGrid(const TsdfConfig& config, double half_size_m, bool vectors) :
   rules_.low_appear_to_m =
       config.appear_range_m > 0.0 ? std::max(rules_.appear_to_m, rules_.standing_clear_to_m) : 0.0f;
   rules_.vectors = vectors;
-  weighted_sum_.resize(count);
+  deficit_.resize(count);
   weight_.resize(count);
   standing_weight_.resize(count);
   value_.resize(count);
@@ -195,7 +194,7 @@ int TsdfGrid::cell_of(double coordinate_m) const {
 }
 
 void TsdfGrid::clear() {
-  std::fill(weighted_sum_.begin(), weighted_sum_.end(), 0);
+  std::fill(deficit_.begin(), deficit_.end(), 0u);
   std::fill(weight_.begin(), weight_.end(), 0);
   std::fill(standing_weight_.begin(), standing_weight_.end(), 0);
   std::fill(value_.begin(), value_.end(), kUnknown);
@@ -207,7 +206,7 @@ void TsdfGrid::clear() {
 
 void TsdfGrid::reset_cell(int ix, int iy, std::uint32_t next_sequence) {
   const std::size_t i = index(ix, iy);
-  weighted_sum_[i] = 0;
+  deficit_[i] = 0;
   weight_[i] = 0;
   standing_weight_[i] = 0;
   reset_[i] = next_sequence;
@@ -254,7 +253,7 @@ void TsdfGrid::scroll_to(double x_m, double y_m, std::uint32_t next_sequence) {
 
 float TsdfGrid::distance(int ix, int iy) const {
   const std::size_t i = index(ix, iy);
-  return weight_[i] > 0 ? static_cast<float>(weighted_sum_[i]) / static_cast<float>(weight_[i])
+  return weight_[i] > 0 ? static_cast<float>(weighted_sum_units(i)) / static_cast<float>(weight_[i])
                         : std::numeric_limits<float>::quiet_NaN();
 }
 
@@ -264,6 +263,14 @@ float TsdfGrid::weight(int ix, int iy) const {
 
 void TsdfGrid::add(const TsdfObservation& observation) { apply<true>(observation); }
 void TsdfGrid::remove(const TsdfObservation& observation) { apply<false>(observation); }
+
+/// How far a row of cells takes part in an observation.
+double TsdfGrid::row_reach_m(const TsdfObservation& o, int iy) const {
+  const double reach_m = o.reach_m, every_m = config_.every_row_to_m;
+  const std::uint32_t turn = (static_cast<std::uint32_t>(iy) + o.sequence) & 3u;
+  if (every_m <= 0.0 || turn == 0) return reach_m;
+  return std::min(reach_m, turn == 2 ? 2.0 * every_m : every_m);
+}
 
 template <bool kAdd>
 void TsdfGrid::apply(const TsdfObservation& o) {
@@ -279,9 +286,10 @@ void TsdfGrid::apply(const TsdfObservation& o) {
   for (int iy = low_y; iy < high_y; ++iy) {
     double low = 0.0, high = 0.0;
     TsdfChange change;
-    if (view.span(center_m(iy) - o.T_map_sensor.y_m, &low, &high)) {
-      const int from = std::max(first_x_, cell_of(o.T_map_sensor.x_m + low) - 1);
-      const int to = std::min(first_x_ + size_, cell_of(o.T_map_sensor.x_m + high) + 2);
+    if (view.span(center_m(iy) - o.T_map_sensor.y_m, row_reach_m(o, iy), &low, &high)) {
+      // Whole groups of eight, which vector code takes at once.
+      const int from = std::max(first_x_, (cell_of(o.T_map_sensor.x_m + low) - 1) & ~7);
+      const int to = std::min(first_x_ + size_, (cell_of(o.T_map_sensor.x_m + high) + 9) & ~7);
       if (from < to) change = apply_row<kAdd>(o, cos_yaw, sin_yaw, iy, from, to);
     }
     // A row of quads stands on two rows of cells.
@@ -322,7 +330,7 @@ TsdfChange TsdfGrid::apply_row(const TsdfObservation& o, float cos_yaw, float si
   for (int x = from_x; x < to_x;) {  // the torus cuts a row in two pieces at most
     const int piece = std::min(to_x - x, size_ - (x & mask_));
     const std::size_t i = index(x, iy);
-    const TsdfCells cells{&weighted_sum_[i], &weight_[i],         &standing_weight_[i], &reset_[i],
+    const TsdfCells cells{&deficit_[i],     &weight_[i],         &standing_weight_[i], &reset_[i],
                           &last_seen_s_[i],  &contradictions_[i], &value_[i]};
     const std::int32_t* const column = row_column_.data() + (x - from_x);
     const float* const distance = row_distance_m_.data() + (x - from_x);

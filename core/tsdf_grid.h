@@ -21,6 +21,7 @@ struct TsdfConfig {
   double low_clear_range_m = 2.5;
   double front_clear_range_m = 4.0;
   double appear_range_m = 1.2;
+  double every_row_to_m = 5.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -45,6 +46,9 @@ struct TsdfConfig {
              "Up to here a surface in cells known to be free counts at once, as its going does: before it is too near "
              "for the camera to see it. A low one up to low_clear_range_m, as from farther away it could not be seen. 0 = "
              "never.");
+    v.number("every_row_to_m", every_row_to_m, 0, 1000, "m",
+             "Up to here a frame is integrated in every row of cells; beyond it in every second one, beyond twice that in every "
+             "fourth, others with every frame: most cells lie far away, where one frame says little. 0 = in all (the paper's).");
   }
   std::vector<std::string> validate() const { return {}; }
   /// The largest weight one observation adds to a cell, in integer units.
@@ -107,7 +111,7 @@ class TsdfGrid {
   float distance(int ix, int iy) const;
   /// W in the paper's unit, 1 / m^2.
   float weight(int ix, int iy) const;
-  std::int32_t weighted_sum_units(int ix, int iy) const { return weighted_sum_[index(ix, iy)]; }
+  std::int32_t weighted_sum_units(int ix, int iy) const { return weighted_sum_units(index(ix, iy)); }
   std::int32_t weight_units(int ix, int iy) const { return weight_[index(ix, iy)]; }
   std::uint32_t reset_sequence(int ix, int iy) const { return reset_[index(ix, iy)]; }
   /// The window's clock when the cell was last touched.
@@ -132,14 +136,16 @@ class TsdfGrid {
     return is_standing(standing_weight_units(ix, iy), weight_units(ix, iy), weight_unit_);
   }
   float weight_unit() const { return weight_unit_; }
-  const std::int32_t* weighted_sums() const { return weighted_sum_.data(); }
-  const std::int32_t* weights() const { return weight_.data(); }
+  // By index().
+  std::int32_t weighted_sum_units(std::size_t cell) const { return weighted_sum_of(deficit_[cell], weight_[cell]); }
+  std::int32_t weight_units(std::size_t cell) const { return weight_[cell]; }
 
   std::uint64_t cells_reset_by_contradiction() const { return contradicted_; }
 
  private:
   template <bool kAdd>
   void apply(const TsdfObservation& observation);
+  double row_reach_m(const TsdfObservation& observation, int iy) const;
   template <bool kAdd>
   TsdfChange apply_row(const TsdfObservation& observation, float cos_yaw, float sin_yaw, int iy, int from_x, int to_x);
   void rebuild_quads(int iy, int from_x, int to_x);
@@ -150,7 +156,8 @@ class TsdfGrid {
   int first_x_ = 0, first_y_ = 0;
   float weight_unit_ = 0.0f;
   TsdfRules rules_;
-  std::vector<std::int32_t> weighted_sum_, weight_, standing_weight_;
+  std::vector<std::int32_t> weight_, standing_weight_;
+  std::vector<std::uint32_t> deficit_;  ///< see TsdfCells
   std::vector<std::uint32_t> reset_;
   std::vector<float> last_seen_s_;
   std::vector<std::int8_t> value_;

@@ -12,7 +12,8 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 void resize(std::size_t columns, TsdfObservation* out) {
   for (std::vector<float>* field :
        {&out->direction_x, &out->direction_y, &out->range_m, &out->truncation_m, &out->free_from_m,
-        &out->free_to_m, &out->clear_from_m, &out->clear_to_m, &out->inverse_truncation_per_m}) {
+        &out->free_to_m, &out->clear_from_m, &out->clear_to_m, &out->inverse_truncation_per_m, &out->free_from_8_m,
+        &out->free_to_8_m}) {
     field->resize(columns);
   }
   out->standing.assign(columns, 0);
@@ -107,6 +108,25 @@ void set_edges(const TruncationConfig& truncation, TsdfObservation* out) {
   }
 }
 
+/// Sliding maxima and minima over 8 columns, or as many as there are left, by doubling.
+void set_free_8(TsdfObservation* out) {
+  const std::size_t n = out->columns();
+  for (std::size_t i = 0; i < n; ++i) {
+    // Rounding must not bring a cell into the support that is called free here.
+    const float support = std::isnan(out->range_m[i])
+                              ? out->free_to_m[i]
+                              : out->range_m[i] - out->truncation_m[i] - 1e-4f * (out->range_m[i] + 1.0f);
+    out->free_from_8_m[i] = out->free_from_m[i];
+    out->free_to_8_m[i] = std::min(out->free_to_m[i], support);
+  }
+  for (const std::size_t step : {1u, 2u, 4u}) {
+    for (std::size_t i = 0; i + step < n; ++i) {
+      out->free_from_8_m[i] = std::max(out->free_from_8_m[i], out->free_from_8_m[i + step]);
+      out->free_to_8_m[i] = std::min(out->free_to_8_m[i], out->free_to_8_m[i + step]);
+    }
+  }
+}
+
 void set_reach(TsdfObservation* out) {
   float reach = 0.0f;
   for (std::size_t i = 0; i < out->columns(); ++i) {
@@ -163,6 +183,7 @@ void observation_from(const DepthProfile& profile, const ObservationLimits& limi
   }
   set_edges(limits.truncation, out);
   set_clear(limits, out);
+  set_free_8(out);
   set_reach(out);
 }
 
@@ -195,6 +216,7 @@ void observation_from(const RangeScan& scan, const ObservationLimits& limits, Ts
   }
   // No edges: half a degree apart, rays that meet one wall at a sharp angle end as far apart as those that pass an edge.
   set_clear(limits, out);
+  set_free_8(out);
   set_reach(out);
 }
 

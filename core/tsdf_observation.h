@@ -82,6 +82,8 @@ struct TsdfObservation {
   std::vector<float> free_from_m, free_to_m;  ///< carved between these; free_to < free_from: nothing
   /// Between these nothing stands within a margin on either side of the ray.
   std::vector<float> clear_from_m, clear_to_m;
+  /// From every column on over eight: between these all of them saw free space, before any surface's support.
+  std::vector<float> free_from_8_m, free_to_8_m;
   float reach_m = 0.0f;  ///< no cell farther than this is touched
 
   std::size_t columns() const { return range_m.size(); }

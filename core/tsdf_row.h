@@ -8,7 +8,8 @@ namespace knav {
 
 /// The part of a row of cells that lies in one piece in memory; a pointer each to its first cell.
 struct TsdfCells {
-  std::int32_t* weighted_sum;
+  /// Sum of w minus sum of w f, by which the sum of w f is kept: free space, most of what a frame sees, adds nothing to it.
+  std::uint32_t* deficit;
   std::int32_t* weight;
   std::int32_t* standing_weight;  ///< the share of `weight` that surfaces of low or high things gave
   std::uint32_t* reset;
@@ -16,6 +17,11 @@ struct TsdfCells {
   std::uint8_t* contradictions;
   std::int8_t* value;
 };
+
+/// The sum of w f.
+inline std::int32_t weighted_sum_of(std::uint32_t deficit, std::int32_t weight) {
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(weight) - deficit);
+}
 
 /// What integrating needs besides the observation.
 struct TsdfRules {
