@@ -135,7 +135,8 @@ RayEnd cast(const TsdfGrid& grid, const ContourConfig& config, const FreeBlocks*
         static_cast<unsigned>(walk.iy - first_y) >= inside)
       break;
     if (blocks && blocks->free(0, walk.ix, walk.iy)) {
-      const int level = blocks->free(1, walk.ix, walk.iy) ? 1 : 0;
+      int level = 0;
+      while (level + 1 < blocks->levels() && blocks->free(level + 1, walk.ix, walk.iy)) ++level;
       if (walk.leave_block(FreeBlocks::kShift[level], length, &entered, &positive_ix, &positive_iy)) {
         positive_at = unknown_from = entered;
         continue;
@@ -225,7 +226,7 @@ void extract_contour(const TsdfGrid& grid, const ContourConfig& config, const Po
   }
   cos_sin(angle.data(), rays, cosine.data(), sine.data());
   for (std::size_t i = 0; i < rays; ++i) {
-    const RayEnd end = cast(grid, config, &blocks, T.x_m, T.y_m, cosine[i], sine[i], config.range_max_m);
+    const RayEnd end = cast(grid, config, blocks.levels() > 0 ? &blocks : nullptr, T.x_m, T.y_m, cosine[i], sine[i], config.range_max_m);
     const bool unknown = end.kind == RayEnd::Kind::kUnknown;
     scan->range_m[i] = unknown ? kNaN : end.kind == RayEnd::Kind::kFree ? kInf : end.range_m;
     const float age_s = std::max(0.0f, now_age_clock_s - end.last_seen_s);

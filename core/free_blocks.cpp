@@ -7,14 +7,11 @@
 namespace knav {
 namespace {
 
-constexpr std::uint32_t kSigns = 0x80808080u;  // set in a corner that is negative or unknown
-constexpr std::uint32_t kAllUnknown = 0x80808080u;
-
 KNAV_MULTIVERSION
-void gather_bits(const std::uint32_t* quad, int count, std::uint32_t* bad, std::uint32_t* known) {
+void widen(const std::int8_t* value, int count, std::int8_t* lowest, std::int8_t* highest) {
   for (int k = 0; k < count; ++k) {
-    bad[k] |= (quad[k] & kSigns) | (quad[k] == 0 ? 1u : 0u);
-    known[k] |= quad[k] ^ kAllUnknown;
+    lowest[k] = value[k] < lowest[k] ? value[k] : lowest[k];
+    highest[k] = value[k] > highest[k] ? value[k] : highest[k];
   }
 }
 
@@ -23,11 +20,11 @@ void gather_bits(const std::uint32_t* quad, int count, std::uint32_t* bad, std::
 void FreeBlocks::build(const TsdfGrid& grid, double x_m, double y_m, double reach_m) {
   bits_ = grid.bits();
   mask_ = grid.size_cells() - 1;
-  for (int level = 0; level < kLevels; ++level) {
-    const int side = std::max(1, grid.size_cells() >> kShift[level]);
-    kind_[level].assign(static_cast<std::size_t>(side) * static_cast<std::size_t>(side), 0);
+  for (levels_ = 0; levels_ < kLevels && kShift[levels_] <= bits_; ++levels_) {
+    const auto side = static_cast<std::size_t>(grid.size_cells() >> kShift[levels_]);
+    kind_[levels_].assign(side * side, kMixed);
   }
-  if (grid.size_cells() < (1 << kShift[kLevels - 1])) return;
+  if (levels_ == 0) return;
   // Whole blocks of the finest level that lie in the window: its last row and column of quads end outside.
   constexpr int kStep = 1 << kShift[0];
   const auto up = [](int i) { return (i + kStep - 1) & ~(kStep - 1); };
@@ -39,16 +36,17 @@ void FreeBlocks::build(const TsdfGrid& grid, double x_m, double y_m, double reac
   const int low_y = std::max(up(grid.first_y()), down(grid.cell_of(y_m) - reach));
   const int high_y = std::min(down(last_y), up(grid.cell_of(y_m) + reach));
   if (low_x >= high_x) return;
-  bad_.resize(static_cast<std::size_t>(high_x - low_x));
-  known_.resize(bad_.size());
+  // A block of quads stands on a row and a column of cells more.
+  const int cells = high_x - low_x + 1;
+  lowest_.resize(static_cast<std::size_t>(cells));
+  highest_.resize(lowest_.size());
   for (int y = low_y; y < high_y; y += kStep) {
-    std::fill(bad_.begin(), bad_.end(), 0u);
-    std::fill(known_.begin(), known_.end(), 0u);
-    for (int row = y; row < y + kStep; ++row) {
-      for (int x = low_x; x < high_x;) {
-        const int piece = std::min(high_x - x, grid.size_cells() - (x & mask_));
-        gather_bits(grid.quads() + grid.quad_index(x, row), piece, bad_.data() + (x - low_x),
-                    known_.data() + (x - low_x));
+    std::fill(lowest_.begin(), lowest_.end(), std::int8_t{127});
+    std::fill(highest_.begin(), highest_.end(), TsdfGrid::kUnknown);
+    for (int row = y; row <= y + kStep; ++row) {
+      for (int x = low_x; x <= high_x;) {
+        const int piece = std::min(high_x + 1 - x, grid.size_cells() - (x & mask_));
+        widen(grid.values() + grid.index(x, row), piece, lowest_.data() + (x - low_x), highest_.data() + (x - low_x));
         x += piece;
       }
     }
@@ -56,15 +54,14 @@ void FreeBlocks::build(const TsdfGrid& grid, double x_m, double y_m, double reac
     std::uint8_t* const out =
         kind_[0].data() + (static_cast<std::size_t>((y & mask_) >> kShift[0]) << side_bits);
     for (int x = low_x; x < high_x; x += kStep) {
-      std::uint32_t bad = 0, known = 0;
-      for (int j = 0; j < kStep; ++j) {
-        bad |= bad_[static_cast<std::size_t>(x - low_x + j)];
-        known |= known_[static_cast<std::size_t>(x - low_x + j)];
-      }
-      out[(x & mask_) >> kShift[0]] = bad == 0 ? kFree : known == 0 ? kUnknown : kMixed;
+      const std::int8_t* const low = lowest_.data() + (x - low_x);
+      const std::int8_t* const high = highest_.data() + (x - low_x);
+      const bool free = *std::min_element(low, low + kStep + 1) > 0;
+      const bool unknown = *std::max_element(high, high + kStep + 1) == TsdfGrid::kUnknown;
+      out[(x & mask_) >> kShift[0]] = free ? kFree : unknown ? kUnknown : kMixed;
     }
   }
-  for (int level = 1; level < kLevels; ++level) {
+  for (int level = 1; level < levels_; ++level) {
     const int ratio = 1 << (kShift[level] - kShift[level - 1]);
     const int side = grid.size_cells() >> kShift[level], fine_side = grid.size_cells() >> kShift[level - 1];
     for (int y = 0; y < side; ++y) {

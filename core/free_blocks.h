@@ -11,14 +11,16 @@ namespace knav {
 /// them in one step without passing over anything: what it would have found in each of their cells is known.
 class FreeBlocks {
  public:
-  static constexpr int kLevels = 2;
-  static constexpr int kShift[kLevels] = {3, 5};  ///< blocks of 8 x 8 and of 32 x 32
+  static constexpr int kLevels = 3;
+  static constexpr int kShift[kLevels] = {3, 5, 7};  ///< blocks of 8 x 8, 32 x 32 and 128 x 128
 
   /// Looks at the blocks within `reach_m` of the point.
   void build(const TsdfGrid& grid, double x_m, double y_m, double reach_m);
 
-  /// Whether each quad of the block round quad (ix, iy) is known in all corners, negative in none and above
-  /// zero in one.
+  /// How many of the levels the grid is large enough for.
+  int levels() const { return levels_; }
+
+  /// Whether all corners of each quad of the block round quad (ix, iy) are known and above zero.
   bool free(int level, int ix, int iy) const {
     const int shift = kShift[level], bits = bits_ - shift;
     const int x = (ix & mask_) >> shift, y = (iy & mask_) >> shift;
@@ -33,9 +35,9 @@ class FreeBlocks {
 
  private:
   enum Kind : std::uint8_t { kMixed, kFree, kUnknown };
-  int bits_ = 0, mask_ = 0;
+  int bits_ = 0, mask_ = 0, levels_ = 0;
   std::vector<std::uint8_t> kind_[kLevels];
-  std::vector<std::uint32_t> bad_, known_;  ///< scratch of a row of blocks, one entry per column of quads
+  std::vector<std::int8_t> lowest_, highest_;  ///< scratch of a row of blocks: of each column's cells
 };
 
 }  // namespace knav

@@ -21,7 +21,7 @@ struct TsdfConfig {
   double low_clear_range_m = 2.5;
   double front_clear_range_m = 4.0;
   double appear_range_m = 1.2;
-  double every_row_to_m = 5.0;
+  double every_row_to_m = 8.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -129,6 +129,7 @@ class TsdfGrid {
   /// set of the cache, and reading along a wall would miss it every time (3.7 instead of 1 ns a reading).
   int quad_stride() const { return quad_stride_; }
   std::int8_t value(int ix, int iy) const { return value_[index(ix, iy)]; }
+  const std::int8_t* values() const { return value_.data(); }  ///< by index()
   /// What of weight_units() surfaces of low or high things gave.
   std::int32_t standing_weight_units(int ix, int iy) const { return standing_weight_[index(ix, iy)]; }
   /// See is_standing().
