@@ -37,7 +37,8 @@ GlobalSearch::GlobalSearch(const GlobalSearchConfig& search, const MeasurementCo
                            const HealthConfig& health)
     : config_(search), measurement_(measurement), health_(health) {}
 
-void GlobalSearch::start(const MapFields& fields, const ScanRays& rays, const std::vector<Pose2>& seeds) {
+void GlobalSearch::start(const MapFields& fields, const ScanRays& rays, const std::vector<Pose2>& seeds,
+                         bool seeds_tracked) {
   thin_out(rays, static_cast<std::size_t>(config_.coarse_rays), &coarse_rays_);
   thin_out(rays, kFineRays, &fine_rays_);
   headings_ = static_cast<std::size_t>(std::ceil(2.0 * kPi / config_.step_rad));
@@ -53,7 +54,7 @@ void GlobalSearch::start(const MapFields& fields, const ScanRays& rays, const st
   seeds_.clear();
   for (const Pose2& seed : seeds) {
     if (!is_finite(seed)) continue;
-    seeds_.push_back({seed, 1.0, 0.0});
+    seeds_.push_back({seed, 1.0, 0.0, seeds_tracked});
     check(fields, &seeds_.back());
   }
   stage_ = Stage::kCoarse;
@@ -114,7 +115,7 @@ std::size_t GlobalSearch::try_places(const MapFields& fields) {
 
 void GlobalSearch::choose_candidates(const MapFields& fields) {
   for (const Best& best : best_of_bin_) {
-    if (best.cost <= 1.0f) candidates_.push_back({{best.x_m, best.y_m, best.yaw_rad}, best.cost, 0.0});
+    if (best.cost <= 1.0f) candidates_.push_back({{best.x_m, best.y_m, best.yaw_rad}, best.cost, 0.0, false});
   }
   const auto better = [](const Hypothesis& a, const Hypothesis& b) { return a.cost < b.cost; };
   std::stable_sort(candidates_.begin(), candidates_.end(), better);
@@ -122,14 +123,15 @@ void GlobalSearch::choose_candidates(const MapFields& fields) {
     candidates_.resize(static_cast<std::size_t>(config_.candidates));
   }
   for (const Hypothesis& seed : seeds_) {
-    if (fields.map.nearest(seed.T_map_base.x_m, seed.T_map_base.y_m) > 0.0f) candidates_.push_back(seed);
+    if (seed.tracked || fields.map.nearest(seed.T_map_base.x_m, seed.T_map_base.y_m) > 0.0f) candidates_.push_back(seed);
   }
 }
 
 void GlobalSearch::check(const MapFields& fields, Hypothesis* hypothesis) const {
   const Pose2& T = hypothesis->T_map_base;
-  const PoseCheck check = check_pose(fields.map, fine_rays_, T, measurement_, health_);
-  hypothesis->cost = fields.map.nearest(T.x_m, T.y_m) > 0.0f ? check.cost : 1.0;  // inside a wall: no place
+  const PoseCheck check = check_pose(fields.map, fine_rays_, T, measurement_, health_, hypothesis->tracked);
+  const bool no_place = !hypothesis->tracked && !(fields.map.nearest(T.x_m, T.y_m) > 0.0f);  // inside a wall
+  hypothesis->cost = no_place ? 1.0 : check.cost;
   hypothesis->support = check.support;
 }
 

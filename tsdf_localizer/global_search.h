@@ -15,6 +15,7 @@ struct Hypothesis {
   Pose2 T_map_base;
   double cost = 1.0;     ///< PoseCheck::cost after refinement
   double support = 0.0;  ///< PoseCheck::support
+  bool tracked = false;  ///< more than this scan speaks for it: it may lie where the map has something
 };
 
 /// Matches one scan against the whole map: all free places x all headings on a coarse field; the best of each
@@ -26,7 +27,9 @@ class GlobalSearch {
                const HealthConfig& health);
 
   /// @param seeds poses tried beside the grid's, e.g. the current estimate
-  void start(const MapFields& fields, const ScanRays& rays, const std::vector<Pose2>& seeds);
+  /// @param seeds_tracked they may lie where the map has something: a robot that drove there, tracked all the way, stands where
+  /// something was taken away; a place that only searches speak for is none then
+  void start(const MapFields& fields, const ScanRays& rays, const std::vector<Pose2>& seeds, bool seeds_tracked);
   void cancel() { stage_ = Stage::kIdle; }
   bool running() const { return stage_ != Stage::kIdle; }
   /// Some more work; true when this step finished the search. `fields` as in start().

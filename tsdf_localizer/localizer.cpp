@@ -270,7 +270,7 @@ void Localizer::State::judge(double stamp_s) {
                                                                 Eigen::EigenvaluesOnly);
     result.position_sd_m = std::sqrt(std::max(0.0, solver.eigenvalues().maxCoeff()));
     result.yaw_sd_rad = std::sqrt(std::max(0.0, result.covariance(2, 2)));
-    check = check_pose(fields.map, rays, result.T_map_base, config.measurement, config.health);
+    check = check_pose(fields.map, rays, result.T_map_base, config.measurement, config.health, search.tracked());
     if (check.judged() >= static_cast<std::uint32_t>(config.health.rays_min)) {
       health.update(stamp_s, check);
     } else {

@@ -56,6 +56,8 @@ struct HealthConfig {
   double explained_m = 0.05;
   double explained_per_range = 0.012;
   double full_range_m = 3.0;
+  double body_radius_m = 0.2;
+  double taken_away_m = 1.5;
   double ok_fraction = 0.60;
   double fresh_ok_fraction = 0.60;
   double lost_fraction = 0.40;
@@ -75,6 +77,10 @@ struct HealthConfig {
     v.number("full_range_m", full_range_m, 0, 100, "m",
              "A ray shorter than this counts in proportion to its length: half of all rays may meet one thing beside the robot, which was moved "
              "there or taken away. 0 = all count the same.");
+    v.number("body_radius_m", body_radius_m, 0, 5, "m",
+             "What the map has nearer than this to a robot that drove there has been taken away, as the robot stands in its place: it hides "
+             "nothing. 0 = a robot that stands there sees nothing but through walls.");
+    v.number("taken_away_m", taken_away_m, 0, 20, "m", "How far from the robot such a thing reaches at most.");
     v.number("ok_fraction", ok_fraction, 0, 1, "",
              "Smoothed fraction of explained rays below which the verdict is no longer ok.");
     v.number("fresh_ok_fraction", fresh_ok_fraction, 0, 1, "",
@@ -97,6 +103,7 @@ struct HealthConfig {
   std::vector<std::string> validate() const {
     if (lost_fraction > ok_fraction) return {"health/lost_fraction must not exceed health/ok_fraction."};
     if (lost_fraction > fresh_ok_fraction) return {"health/lost_fraction must not exceed health/fresh_ok_fraction."};
+    if (taken_away_m < body_radius_m) return {"health/taken_away_m must not be below health/body_radius_m."};
     return {};
   }
 };

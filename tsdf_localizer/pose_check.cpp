@@ -13,18 +13,24 @@ constexpr std::uint32_t kFreshRaysMin = 30;
 /// True if the segment from the sensor meets a surface more than `slack_m` before its end. Sphere tracing:
 /// the map's own value says how far no surface can be. Ends at the first unknown cell, of which nothing can
 /// be said.
+///
+/// What it meets nearer than `body_m` cannot be there, as the robot is: that has been taken away, with what the map could not see of it,
+/// up to `taken_away_m` from the robot. That is one thing that has changed, not one per ray, and what lies behind it tells all the same.
 bool meets_wall(const DistanceMap& map, const Point2& from, const Point2& to, double length_m,
-                double slack_m) {
+                double slack_m, double body_m, double taken_away_m) {
   const GridGeometry& grid = map.geometry;
   const double step_min_m = 0.5 * grid.resolution_m;
   const double ux = (to.x_m - from.x_m) / length_m, uy = (to.y_m - from.y_m) / length_m;
   const double end_m = length_m - slack_m;
+  bool in_the_open = !(body_m > 0.0);
   double s = 0.0;
   while (s < end_m) {
     const double distance_m = map.nearest(from.x_m + s * ux, from.y_m + s * uy);
-    if (!(distance_m >= 0.0)) return distance_m < 0.0;
-    // less a cell, as the value is the nearest cell centre's
-    s += std::max(step_min_m, distance_m - grid.resolution_m);
+    const bool open = distance_m >= 0.0;  // false for NaN
+    const double clear_m = open ? std::max(0.0, distance_m - grid.resolution_m) : 0.0;  // less a cell, as the value is the nearest cell centre's
+    in_the_open = in_the_open || (open && s + clear_m >= body_m) || s >= taken_away_m;
+    if (in_the_open && !open) return distance_m < 0.0;
+    s += std::max(step_min_m, clear_m);
   }
   return false;
 }
@@ -37,7 +43,7 @@ double support_of(double explained, double in_front, double through) {
 }
 
 PoseCheck check_pose(const DistanceMap& map, const ScanRays& rays, const Pose2& T_map_base,
-                     const MeasurementConfig& measurement, const HealthConfig& health) {
+                     const MeasurementConfig& measurement, const HealthConfig& health, bool stands_there) {
   PoseCheck check;
   const Pose2 T_map_sensor = T_map_base * rays.T_base_sensor;
   const Point2 from{T_map_sensor.x_m, T_map_sensor.y_m};
@@ -53,7 +59,8 @@ PoseCheck check_pose(const DistanceMap& map, const ScanRays& rays, const Pose2& 
     const double near_m = health.explained_m + health.explained_per_range * range_m;
     // a glancing ray meets a wall long before its end though the pose is only a little off: hence slack with
     // range
-    const bool through = meets_wall(map, from, to, range_m, 2.0 * health.explained_m + 0.1 * range_m);
+    const bool through = meets_wall(map, from, to, range_m, 2.0 * health.explained_m + 0.1 * range_m,
+                                    stands_there ? health.body_radius_m : 0.0, health.taken_away_m);
     double price = measurement.unknown_cost;
     Kind kind = kUnknown;
     if (through && distance_m <= near_m) {

@@ -30,7 +30,9 @@ struct PoseCheck {
 /// nothing is judged. Of rays, or of what they count (HealthConfig::full_range_m).
 double support_of(double explained, double in_front, double through);
 
+/// @param stands_there true: something besides this scan says that the robot is here, as that it drove here; what the map has in its
+/// place has then been taken away (HealthConfig::body_radius_m). A pose that is only tried out lies in a wall if the map says so.
 PoseCheck check_pose(const DistanceMap& map, const ScanRays& rays, const Pose2& T_map_base,
-                     const MeasurementConfig& measurement, const HealthConfig& health);
+                     const MeasurementConfig& measurement, const HealthConfig& health, bool stands_there);
 
 }  // namespace knav

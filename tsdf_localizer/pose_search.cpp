@@ -46,7 +46,7 @@ bool PoseSearch::update(double stamp_s, const MapFields& fields, const ScanRays&
     if (!due(stamp_s) || rays.size() < static_cast<std::size_t>(config_.health.rays_min)) return false;
     std::vector<Pose2> seeds;
     if (!belief->empty()) seeds.push_back(belief->estimate().pose.mean * T_filter_now);
-    search_.start(fields, rays, seeds);
+    search_.start(fields, rays, seeds, tracked());
     T_start_now_ = Pose2();
     distance_m_ = turn_rad_ = 0.0;
     started_s_ = stamp_s;

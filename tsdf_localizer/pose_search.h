@@ -30,6 +30,8 @@ class PoseSearch {
   void doubt(Prior prior, const std::string& why);
   bool in_doubt() const { return in_doubt_; }
   Prior prior() const { return prior_; }
+  /// More than searches speak for the estimate: it was right, or was given, and the motion since is known.
+  bool tracked() const { return !in_doubt_ || prior_ != Prior::kNone; }
   const std::string& why() const { return why_; }
   bool searching() const { return search_.running(); }
   double progress() const { return search_.progress(); }

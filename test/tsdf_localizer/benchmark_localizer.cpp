@@ -85,7 +85,7 @@ void BM_CheckPose(benchmark::State& state) {
   ScanRays rays;
   select_rays(make_scan(office, kPose, test::ScanModel(), 0.0), Pose2(), config, 0, 0.0, config.measurement.evidence_power, &rays);
   for (auto _ : state)
-    benchmark::DoNotOptimize(check_pose(map, rays, kPose, config.measurement, config.health));
+    benchmark::DoNotOptimize(check_pose(map, rays, kPose, config.measurement, config.health, true));
 }
 BENCHMARK(BM_CheckPose)->Unit(benchmark::kMicrosecond);
 
@@ -110,7 +110,7 @@ void BM_SearchStep(benchmark::State& state) {
   select_rays(make_scan(office, kPose, test::ScanModel(), 0.0), Pose2(), config, 0, 0.0, config.measurement.evidence_power, &rays);
   GlobalSearch search(config.global_search, config.measurement, config.health);
   for (auto _ : state) {
-    if (!search.running()) search.start(fields, rays, {});
+    if (!search.running()) search.start(fields, rays, {}, false);
     search.step(fields);
   }
 }
