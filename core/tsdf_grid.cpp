@@ -268,7 +268,7 @@ void TsdfGrid::remove(const TsdfObservation& observation) { apply<false>(observa
 double TsdfGrid::row_reach_m(const TsdfObservation& o, int iy) const {
   const double reach_m = o.reach_m, every_m = config_.every_row_to_m;
   const std::uint32_t turn = (static_cast<std::uint32_t>(iy) + o.sequence) & 3u;
-  if (every_m <= 0.0 || turn == 0) return reach_m;
+  if (!o.pinhole || every_m <= 0.0 || turn == 0) return reach_m;
   return std::min(reach_m, turn == 2 ? 2.0 * every_m : every_m);
 }
 

@@ -47,8 +47,9 @@ struct TsdfConfig {
              "for the camera to see it. A low one up to low_clear_range_m, as from farther away it could not be seen. 0 = "
              "never.");
     v.number("every_row_to_m", every_row_to_m, 0, 1000, "m",
-             "Up to here a frame is integrated in every row of cells; beyond it in every second one, beyond twice that in every "
-             "fourth, others with every frame: most cells lie far away, where one frame says little. 0 = in all (the paper's).");
+             "DepthProfile: up to here a frame is integrated in every row of cells, beyond it in every second one, beyond twice that in every "
+             "fourth, in other ones with each frame: most cells lie far away, where one frame of thirty a second says little. 0 = in all "
+             "(the paper's).");
   }
   std::vector<std::string> validate() const { return {}; }
   /// The largest weight one observation adds to a cell, in integer units.

@@ -20,6 +20,7 @@ namespace {
 
 TEST(TsdfGrid, PlainAndVectorCodeGiveTheSameBytes) {
   TsdfConfig config;  // the defaults: weights that fall off behind surfaces
+  config.every_row_to_m = 1.5;  // farther rows take turns
   TsdfGrid plain(config, 3.2, false), vectors(config, 3.2, true);
   RandomStream random(11, random_stream::kTest, 3, 0);
   std::vector<TsdfObservation> held;
@@ -127,7 +128,8 @@ class AddRemoveProperty : public ::testing::TestWithParam<std::tuple<bool, bool>
 
 TEST_P(AddRemoveProperty, ExactWhateverTheOrderWithScrollingAndResets) {
   const bool pinhole = std::get<0>(GetParam());
-  const TsdfConfig config = fixed_truncation(0.3);
+  TsdfConfig config = fixed_truncation(0.3);
+  config.every_row_to_m = 1.5;  // farther rows take turns
   TsdfGrid grid(config, 3.2, std::get<1>(GetParam()));  // 128 x 128 cells: the observations reach out of it
   std::map<std::uint32_t, TsdfObservation> held;
   RandomStream random(7, random_stream::kTest, pinhole ? 1 : 2, 0);

@@ -112,6 +112,43 @@ TEST(TsdfGrid, AveragesByWeight) {
   EXPECT_NEAR(grid.distance(36, 0), 0.0, 1e-3);
 }
 
+TEST(TsdfGrid, FarRowsTakeTurns) {
+  // A wall 6 m ahead, every row up to 1 m: of four frames each cell before 1 m gets all, one from there to 2 m two, one beyond 2 m
+  // one. A frame weighs 1 / d^2 (at most 4).
+  TsdfConfig config = fixed_truncation(0.4);
+  config.every_row_to_m = 1.0;
+  TsdfGrid grid(config, 8.0);
+  DepthProfile profile = profile_of(std::vector<float>(41, 6.0f), 40.0);
+  std::fill(profile.free_from_m.begin(), profile.free_from_m.end(), 0.3f);
+  std::fill(profile.free_to_m.begin(), profile.free_to_m.end(), 6.0f);
+  TsdfObservation o;
+  observation_from(profile, limits_of(config), &o);
+  o.T_map_sensor = {0.025, 0.025, 0.0};
+  for (o.sequence = 1; o.sequence <= 4; ++o.sequence) grid.add(o);
+  const auto frames = [&](int ix, int iy) {
+    const double d2 = 0.0025 * (ix * ix + iy * iy);
+    return grid.weight(ix, iy) * std::max(d2, 0.25);
+  };
+  for (int iy = -3; iy <= 3; ++iy) {
+    EXPECT_NEAR(frames(10, iy), 4.0, 0.01) << iy;   // 0.5 m
+    EXPECT_NEAR(frames(120, iy), 1.0, 0.01) << iy;  // 6 m: the wall
+    EXPECT_NEAR(frames(60, iy), 1.0, 0.01) << iy;   // 3 m: free
+    EXPECT_NEAR(frames(30, iy), 2.0, 0.01) << iy;   // 1.5 m: free
+  }
+  // A scan comes seldom and sees far: all of it, always.
+  TsdfGrid scanned(config, 8.0);
+  RangeScan scan;
+  scan.angle_min_rad = -0.1;
+  scan.angle_increment_rad = 0.01;
+  scan.range_max_m = 20.0;
+  scan.range_m.assign(21, 6.0f);
+  observation_from(scan, limits_of(config), &o);
+  o.sequence = 1;
+  o.T_map_sensor = {0.025, 0.025, 0.0};
+  scanned.add(o);
+  for (int iy = -3; iy <= 3; ++iy) EXPECT_TRUE(scanned.known(100, iy)) << iy;
+}
+
 TEST(TsdfGrid, FreeOnlyWhereTheFloorWasSeen) {
   const TsdfConfig config = fixed_truncation(0.4);
   TsdfGrid grid(config, 6.0);
