@@ -13,7 +13,7 @@ struct ContourConfig {
   double range_max_m = 20.0;
   double blind_radius_m = 1.5;
   double unknown_gap_m = 0.15;
-  double surface_within = 0.35;
+  double surface_within = 0.2;
   double evidence_decay_s = 30.0;
   bool merge_newest = true;
 
