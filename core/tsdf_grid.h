@@ -61,7 +61,7 @@ struct TsdfConfig {
 /// The projective truncated signed distance map of paper section III.D, as a torus that scrolls with the
 /// robot.
 ///
-/// Each cell holds the integer sums of w f and of w, so that taking an observation away (equations 8, 9) is
+/// Each cell holds the integer sums of w f (as its difference from the next, see TsdfCells) and of w, so that taking an observation away (equations 8, 9) is
 /// exact to the bit whatever the order. A cell also remembers since which observation it counts: scrolling a
 /// cell in, or clear free evidence against its surface, resets it, and removing an older observation then
 /// skips it. Hence a cell always holds exactly the sum of the held observations that are not older than its

@@ -25,8 +25,8 @@ inline std::uint64_t bytes8(const void* p) {
   return bytes;
 }
 
-/// The columns that see eight neighbouring cells, and what the observation says of them. A gather costs forty
-/// micro-operations; where the columns lie within eight, as they do from 8 m on, a load and a permutation do.
+/// The columns that see eight neighbouring cells, and what the observation says of them. A gather costs many times a load;
+/// where the columns lie within eight, as with a Kinect from 15 m on and nearer along its rays, a load and a permutation do.
 class Columns8 {
  public:
   KNAV_AVX2 Columns8(const TsdfObservation& o, __m256i u) : u_(_mm256_max_epi32(u, _mm256_setzero_si256())) {
