@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
 #include "core/surface_code.h"
@@ -29,25 +30,13 @@ bool same_grid(const GridGeometry& a, const GridGeometry& b) {
 
 }  // namespace
 
-int MapLayer::squared_for(double clearance_m) const {
-  const double units = (clearance_m / geometry.resolution_m + surface_cells) * units_per_cell;
-  return std::max(1, static_cast<int>(std::ceil(units * units - 1e-9)));
-}
-
-double MapLayer::smooth_clearance_m(double x_m, double y_m) const {
-  if (squared_at(geometry.cell_x(x_m), geometry.cell_y(y_m)) <= 0) return 0.0;
-  const double x = (x_m - geometry.origin_x_m) / geometry.resolution_m - 0.5, y = (y_m - geometry.origin_y_m) / geometry.resolution_m - 0.5;
-  const int ix = static_cast<int>(std::floor(x)), iy = static_cast<int>(std::floor(y));
-  const double u = x - ix, v = y - iy;
-  const auto at = [&](int dx, int dy) { return clearance_of(squared_at(ix + dx, iy + dy)); };
-  return (1.0 - v) * ((1.0 - u) * at(0, 0) + u * at(1, 0)) + v * ((1.0 - u) * at(0, 1) + u * at(1, 1));
-}
-
-CombinedMap::CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s, double surface_cells)
+CombinedMap::CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s, double surface_cells,
+                         HalfSeen half_seen)
     : reach_m_(reach_m),
       occupied_threshold_(occupied_threshold),
       free_threshold_(free_threshold),
       distance_(1),
+      half_seen_(std::move(half_seen)),
       memory_s_(memory_s) {
   global_.surface_cells = surface_cells;
 }
@@ -102,6 +91,7 @@ void CombinedMap::set_global(const DistanceMap& distance, const OccupancyGrid& o
   global_.squared.assign(cells, 0);
   update_clearance({0, 0, geometry.width_cells, geometry.height_cells}, &global_);
   combined_ = global_;
+  half_seen_.reset(geometry);
   local_window_ = {};
   local_cells_.clear();
   remembered_.clear();
@@ -133,7 +123,7 @@ void CombinedMap::update_clearance(const CellWindow& window, MapLayer* layer) {
   distance_.update(g.width_cells, g.height_cells, bytes(layer->state), kOpen, layer->surface.data(), window, layer->squared.data());
 }
 
-void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local, double now_s) {
+void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local, double now_s, const Pose2& T_map_robot) {
   if (empty() || local.value.size() != local.geometry.cell_count() || !is_finite(T_map_local)) return;
   const GridGeometry& g = global_.geometry;
   const GridGeometry& l = local.geometry;
@@ -162,7 +152,10 @@ void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local
   T_local_map_ = T_map_local.inverse();
   local_geometry_ = l;
   now_s_ = now_s;
-  if (!window.empty()) sample_local(local, T_map_local, window);
+  if (!window.empty()) {
+    sample_local(local, T_map_local, window);
+    half_seen_.widen(global_, window, T_map_robot, &local_cells_, &local_surface_);
+  }
   apply(old_window.united(local_window_));
 }
 

@@ -180,7 +180,7 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
 
   double curvature = 2.0 * std::sin(bearing) / std::max(distance, 0.1);
   const double look = std::max(0.5, config_.max_vel_x * t.horizon_s);
-  const double reach = std::min(look, passing_ ? distance : path.remaining_m() + 0.02);
+  const double reach = std::min(look, passing_ ? distance : path.remaining_m() + path.offset_m() + 0.02);
   Rollout ahead = roll_out(input, curvature, reach, 0.6, false);
   const double enough = std::min(reach - 0.01, 0.35);
   if (ahead.free_m < enough && !passing_) {
@@ -206,7 +206,7 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
       ahead = best_rollout;
     }
   }
-  if (ahead.free_m < 0.06 && reach > 0.06) {
+  if (ahead.free_m < std::min(0.06, reach - 0.01)) {
     passing_ = false;
     const double past = bearing_past(input, bearing);
     if (std::abs(past) > kTurned_rad) {

@@ -92,7 +92,7 @@ bool PlanKeeper::looks_at_it(const MapLayer& unchanged, const Point2& from) cons
 bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, const Point2& robot, double beyond_m,
                              std::vector<Point2>* way) {
   std::vector<Point2> places;
-  for (const double share : {0.92, 1.0, 1.25}) {
+  for (const double share : {1.0, 1.12, 1.25}) {
     for (int k = 0; k < kDirections; ++k) {
       const double angle = 2.0 * kPi * k / kDirections, r = share * config_.planning.look_distance_m;
       const double c = std::cos(angle), s = std::sin(angle);

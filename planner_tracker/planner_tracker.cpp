@@ -53,7 +53,7 @@ const char* to_string(Activity activity) {
 PlannerTracker::State::State(const PlannerTrackerConfig& c)
     : config(c),
       map(c.preferred_radius_m() + kBeyondPreferred_m, c.clearance.occupied_threshold,
-          c.clearance.free_threshold, c.planning.closed_memory_s),
+          c.clearance.free_threshold, c.planning.closed_memory_s, 0.0, {c.clearance.half_seen_m, c.clearance.half_seen_within_m}),
       keeper(c),
       tracker(c),
       moves(c, tracker),
@@ -77,7 +77,7 @@ void PlannerTracker::set_map(const DistanceMap& distance, const OccupancyGrid& o
 
 void PlannerTracker::set_local_map(const OccupancyGrid& local, const Pose2& T_map_local) {
   State& s = *state_;
-  s.map.set_local(local, T_map_local, s.last_step_s);
+  s.map.set_local(local, T_map_local, s.last_step_s, s.input.T_map_base);
   if (s.map.empty()) return;
   s.moving.update(s.map.global(), s.map.combined(), s.map.local_window(), {s.input.T_map_base.x_m, s.input.T_map_base.y_m}, s.last_step_s);
   s.walkers.update(s.moving.points(), s.map.combined(), s.input.T_map_base, s.last_step_s);
@@ -141,7 +141,7 @@ void PlannerTracker::State::begin(const Pose2& T_map_goal) {
   keeper.start_goal();
   tracker.reset();
   moves.end();
-  next_plan_s = missing_since_s = blocked_since_s = looking_since_s = near_since_s = lost_since_s = -1.0;
+  next_plan_s = missing_since_s = blocked_since_s = looking_since_s = standing_since_s = near_since_s = lost_since_s = -1.0;
   avoidances = 0;
 }
 

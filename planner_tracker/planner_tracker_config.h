@@ -15,6 +15,8 @@ struct ClearanceConfig {
   double preferred_m = 0.25;
   double price = 2.0;
   double escape_m = 1.0;
+  double half_seen_m = 0.1;
+  double half_seen_within_m = 1.3;
   int occupied_threshold = 65;
   int free_threshold = 25;
 
@@ -32,6 +34,10 @@ struct ClearanceConfig {
     v.number("escape_m", escape_m, 0, 3, "m",
              "A robot that stands nearer to something than hard_m may leave by a way this long that never "
              "comes nearer.");
+    v.number("half_seen_m", half_seen_m, 0, 0.5, "m",
+             "What came up near the robot and was never in view from farther away than half_seen_within_m counts as so much wider all round: "
+             "of somebody who stepped beside it the camera has seen legs only. 0 = off.");
+    v.number("half_seen_within_m", half_seen_within_m, 0, 4, "m", "By a camera of the Kinect's view 0.3 m above the floor: beyond, it sees a body.");
     v.integer("occupied_threshold", occupied_threshold, 1, 100, "%",
               "Cells of a map from here on are occupied.");
     v.integer("free_threshold", free_threshold, 0, 99, "%", "Cells up to this are free; between is unknown.");

@@ -8,6 +8,7 @@ namespace knav {
 namespace {
 
 constexpr double kArrived_m = 0.15;
+constexpr double kStillThere_m = 0.3;      ///< once arrived: the pose's noise must not begin the looking anew
 constexpr double kFacing_rad = 0.2;
 constexpr double kStandsBefore_m = 0.8;    ///< what closes the way, and the robot's radius, reach this far before the point
 constexpr double kEnoughFarther_m = 0.15;  ///< less is not worth backing up for
@@ -22,7 +23,7 @@ bool PlannerTracker::State::looking(double now_s, const RobotState& robot) {
   const Point2 p = robot.T_map_base.inverse() * keeper.at();
   const double distance = std::hypot(p.x_m, p.y_m), bearing = std::atan2(p.y_m, p.x_m);
   const bool closed = outcome == PlanKeeper::Outcome::kToBlockage;
-  const bool arrived = path.remaining_m() + path.offset_m() < kArrived_m;
+  const bool arrived = path.remaining_m() + path.offset_m() < (standing_since_s < 0.0 ? kArrived_m : kStillThere_m);
   const bool in_view = closed && distance < config.planning.look_distance_m + kArrived_m &&
                        tracker.straight_free_m(input, bearing, distance) > distance - kStandsBefore_m;
   const bool holding = keeper.holding();
@@ -31,6 +32,7 @@ bool PlannerTracker::State::looking(double now_s, const RobotState& robot) {
   if (in_view && !holding && backing_up(now_s, robot, keeper.at())) return true;
   if (!arrived && (!in_view || (!holding && distance < config.planning.too_near_m()))) return false;
   if (looking_since_s < 0.0) looking_since_s = now_s;
+  if (standing_since_s < 0.0) standing_since_s = now_s;
   if ((closed || outcome == PlanKeeper::Outcome::kToNearby) && !holding && now_s - looking_since_s > kLongEnough_s) {
     // Nothing new from here: what hides the place from here may not hide it from there.
     keeper.look_elsewhere();

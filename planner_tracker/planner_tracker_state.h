@@ -94,7 +94,8 @@ struct PlannerTracker::State {
   double blocked_since_s = -1.0;
   Point2 blocked_at;
   Pose2 T_odom_blocked;  ///< where the robot was then
-  double looking_since_s = -1.0;  ///< standing before a closed way
+  double looking_since_s = -1.0;   ///< standing before a closed way
+  double standing_since_s = -1.0;  ///< the same, but looking elsewhere in vain is no new beginning
   double near_since_s = -1.0;     ///< ... or anything else in the way, too near to see well
   int avoidances = 0;
   double lost_since_s = -1.0, found_since_s = -1.0, turned_rad = 0.0, last_yaw_rad = 0.0;

@@ -208,12 +208,12 @@ bool PlannerTracker::State::avoiding(double now_s, const RobotState& robot) {
                        watch.without_progress_s(now_s) > config.planning.controller_patience;
     // What closes the way may have gone: it stands too near for its floor to be seen, so nothing can clear it
     // here.
-    const bool blind = looking_since_s >= 0.0 &&
-                       now_s - looking_since_s > 2.0 * config.planning.controller_patience &&
+    const bool blind = standing_since_s >= 0.0 &&
+                       now_s - standing_since_s > 2.0 * config.planning.controller_patience &&
                        std::hypot(keeper.at().x_m - robot.T_map_base.x_m,
                                   keeper.at().y_m - robot.T_map_base.y_m) < kFloorSeenFrom_m;
     if (!waited && !oscillating && !stuck && !blind) return false;
-    blocked_since_s = looking_since_s = near_since_s = -1.0;
+    blocked_since_s = looking_since_s = standing_since_s = near_since_s = -1.0;
     watch.dithering_s(now_s, robot.T_odom_base, false, 0.0);
     ++avoidances;
     moves.start(blind ? 4 : 2, {config.recovery.avoid_min_m, config.recovery.avoid_max_m, kOpenEnough_m, config.tracking.slow_mps + 0.05});
@@ -243,7 +243,7 @@ void PlannerTracker::State::drive(double now_s, const RobotState& robot) {
   const bool to_goal = outcome == Outcome::kToGoal;
   const double remaining = path.remaining_m() + path.offset_m();
   if (!to_goal && looking(now_s, robot)) return;
-  looking_since_s = -1.0;
+  looking_since_s = standing_since_s = -1.0;
   if (to_goal && config.min_vel_x < 0.0 && remaining < 0.3) {
     // A goal just overshot, straight behind: back up over what was just driven, if it is still seen free.
     const Point2 p = robot.T_map_base.inverse() * position(goal);

@@ -20,15 +20,16 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Raised whenever simulator or front end come to give other profiles from the same parameters.
-constexpr int kGeneration = 3;
+constexpr int kGeneration = 4;
 constexpr double kOdometryRate_hz = 50.0;
 constexpr std::uint64_t kFramesPerPerfectScan = 30;
 
-/// Scanners at these heights together see what stands in the slice that the profile takes, table tops of 3 cm included.
+/// Scanners at these heights together see what stands in the slice that the profile takes, up to 2 m, table tops of 3 cm included.
 std::vector<double> slice_heights_m() {
   std::vector<double> heights;
   for (double height_m = 0.045; height_m < 1.0; height_m += 0.025) heights.push_back(height_m);
   for (double height_m = 1.1; height_m < 2.0; height_m += 0.2) heights.push_back(height_m);
+  heights.push_back(1.98);
   return heights;
 }
 

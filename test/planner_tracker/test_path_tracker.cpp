@@ -55,5 +55,28 @@ TEST(Tracker, WhereTheArcSweepsUnseenGroundTheRobotTurnsToLookFirst) {
   }
 }
 
+TEST(Tracker, BesideThePathsEndAndUnableToReachItTheRobotIsBlockedAndDoesNotStandThereAsIfItDrove) {
+  // The path's last 3 cm, with the robot 12 cm to their side and something 0.28 m before it on its straight way there: room for 7 cm.
+  const PlannerTrackerConfig config;
+  OccupancyGrid grid = room(4.0, 4.0);
+  fill(&grid, 2.30, 1.5, 2.35, 2.5, 100);
+  CombinedMap map(0.6, config.clearance.occupied_threshold, config.clearance.free_threshold);
+  map.set_global({}, grid, {});
+  const ScanView view = open_view();
+  Path path;
+  path.set({{2.12, 1.5}, {2.12, 2.0}});
+  for (const bool room_left : {false, true}) {
+    PathTracker tracker(config);
+    TrackInput input;
+    input.T_map_base = {room_left ? 1.7 : 2.03, 1.98, 0.0};
+    input.layer = &map.combined();
+    input.scan = &view;
+    path.advance({input.T_map_base.x_m, input.T_map_base.y_m});
+    const TrackOutput out = tracker.follow(input, path);
+    EXPECT_EQ(out.kind, room_left ? TrackOutput::Kind::kDriving : TrackOutput::Kind::kBlocked);
+    EXPECT_EQ(out.v_mps > 0.0, room_left);
+  }
+}
+
 }  // namespace
 }  // namespace knav

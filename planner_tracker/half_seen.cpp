@@ -1,0 +1,110 @@
+#include "planner_tracker/half_seen.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace knav {
+namespace {
+
+constexpr double kHalfView_rad = 0.45;  ///< of a camera of 57 degrees, less what its edges may miss
+constexpr double kViewTo_m = 6.0;
+constexpr double kLookAt_m = 3.0;       ///< farther from the robot nothing is widened
+constexpr int kGap_cells = 3;           ///< between cells of one thing; as near to a surface of the global map it is that surface
+constexpr int kShift_cells = 2;         ///< a thing shifts by so much from one local map to the next
+constexpr double kWidest_m = 0.8;       ///< what is wider is nobody
+
+template <class Any>
+bool any_round(const CellWindow& window, int ix, int iy, int r, const Any& any) {
+  for (int y = std::max(window.y0, iy - r); y <= std::min(window.y1 - 1, iy + r); ++y) {
+    for (int x = std::max(window.x0, ix - r); x <= std::min(window.x1 - 1, ix + r); ++x) {
+      if (any(x, y)) return true;
+    }
+  }
+  return false;
+}
+
+std::size_t at(const CellWindow& window, int ix, int iy) {
+  return static_cast<std::size_t>(iy - window.y0) * static_cast<std::size_t>(window.width()) + static_cast<std::size_t>(ix - window.x0);
+}
+
+}  // namespace
+
+void HalfSeen::reset(const GridGeometry& geometry) {
+  geometry_ = geometry;
+  whole_.assign(wider_m_ > 0.0 ? geometry.cell_count() : 0, 0);
+}
+
+/// What is in view from far enough away has been seen whole; what is gone has not been seen any more.
+void HalfSeen::see(const CellWindow& window, const Pose2& T_map_robot, const std::vector<CellState>& local) {
+  const Pose2 T_robot_map = T_map_robot.inverse();
+  for (int iy = window.y0; iy < window.y1; ++iy) {
+    for (int ix = window.x0; ix < window.x1; ++ix) {
+      std::uint8_t& whole = whole_[geometry_.index(ix, iy)];
+      const CellState state = local[at(window, ix, iy)];
+      if (state == CellState::kOccupied && whole == 0) {
+        const Point2 p = T_robot_map * Point2{geometry_.center_x_m(ix), geometry_.center_y_m(iy)};
+        const double distance = std::hypot(p.x_m, p.y_m);
+        whole = distance > within_m_ && distance < kViewTo_m && std::abs(std::atan2(p.y_m, p.x_m)) < kHalfView_rad ? 1 : 0;
+      } else if (state == CellState::kFree && whole != 0) {
+        const auto occupied = [&](int x, int y) { return local[at(window, x, y)] == CellState::kOccupied; };
+        whole = any_round(window, ix, iy, kShift_cells, occupied) ? 1 : 0;
+      }
+    }
+  }
+}
+
+/// Takes the cells that belong with an open one into `thing_`. @return true if they are one half seen
+bool HalfSeen::collect_thing(const CellWindow& window, std::size_t first) {
+  const int width = window.width();
+  thing_.assign(1, {window.x0 + static_cast<int>(first) % width, window.y0 + static_cast<int>(first) / width});
+  open_[first] = 0;
+  CellWindow extent;
+  bool whole = false;
+  for (std::size_t k = 0; k < thing_.size(); ++k) {
+    const auto [ix, iy] = thing_[k];
+    extent.include(ix, iy);
+    whole = whole || any_round(window, ix, iy, kShift_cells, [&](int x, int y) { return whole_[geometry_.index(x, y)] != 0; });
+    any_round(window, ix, iy, kGap_cells, [&](int x, int y) {
+      std::uint8_t& open = open_[at(window, x, y)];
+      if (open != 0) thing_.emplace_back(x, y);
+      open = 0;
+      return false;
+    });
+  }
+  return !whole && std::max(extent.width(), extent.height()) * geometry_.resolution_m <= kWidest_m;
+}
+
+void HalfSeen::widen(const MapLayer& global, const CellWindow& window, const Pose2& T_map_robot, std::vector<CellState>* local,
+                     std::vector<SurfaceOffset>* surface) {
+  if (whole_.empty()) return;
+  see(window, T_map_robot, *local);
+  const int look = static_cast<int>(kLookAt_m / geometry_.resolution_m);
+  const int rx = geometry_.cell_x(T_map_robot.x_m), ry = geometry_.cell_y(T_map_robot.y_m);
+  const int x0 = std::max(window.x0, rx - look), x1 = std::min(window.x1, rx + look + 1);
+  const int y0 = std::max(window.y0, ry - look), y1 = std::min(window.y1, ry + look + 1);
+  open_.assign(local->size(), 0);
+  for (int iy = y0; iy < y1; ++iy) {
+    for (int ix = x0; ix < x1; ++ix) {
+      const auto mapped = [&](int x, int y) { return global.state[geometry_.index(x, y)] == CellState::kOccupied; };
+      open_[at(window, ix, iy)] = (*local)[at(window, ix, iy)] == CellState::kOccupied && !any_round(window, ix, iy, kGap_cells, mapped) ? 1 : 0;
+    }
+  }
+  half_.clear();
+  for (int iy = y0; iy < y1; ++iy) {
+    for (int ix = x0; ix < x1; ++ix) {
+      if (open_[at(window, ix, iy)] != 0 && collect_thing(window, at(window, ix, iy))) half_.insert(half_.end(), thing_.begin(), thing_.end());
+    }
+  }
+  const double r = wider_m_ / geometry_.resolution_m;
+  for (const auto& [cx, cy] : half_) {
+    any_round(window, cx, cy, static_cast<int>(r), [&](int x, int y) {
+      const std::size_t i = at(window, x, y);
+      if (std::hypot(x - cx, y - cy) > r || (*local)[i] == CellState::kOccupied) return false;
+      (*local)[i] = CellState::kOccupied;
+      (*surface)[i] = {};
+      return false;
+    });
+  }
+}
+
+}  // namespace knav

@@ -1,0 +1,86 @@
+// Somebody who stepped beside the robot: what of him the camera can have seen, and how near he may be passed.
+#include <gtest/gtest.h>
+
+#include "planner_tracker/combined_map.h"
+#include "toy_world.h"
+
+namespace knav {
+namespace {
+
+/// A room 6 x 4 m with one thing in it that only the local map has.
+class Room {
+ public:
+  Room() : map_(0.7, 65, 25, 0.0, 0.0, {0.1, 1.3}), grid_(room(6.0, 4.0)) { map_.set_global({}, grid_, {}); }
+
+  /// Where the robot is, looking along x, and the thing: x0, y0, x1, y1.
+  void see(const Pose2& T_map_robot, double x0, double y0, double x1, double y1) {
+    OccupancyGrid local = grid_;
+    fill(&local, x0, y0, x1, y1, 100);
+    map_.set_local(local, {}, now_s_ += 0.1, T_map_robot);
+  }
+  CellState at(double x_m, double y_m) const {
+    const GridGeometry& g = map_.combined().geometry;
+    return map_.combined().at(g.cell_x(x_m), g.cell_y(y_m));
+  }
+
+ private:
+  CombinedMap map_;
+  OccupancyGrid grid_;
+  double now_s_ = 100.0;
+};
+
+// The cells are 5 cm wide; the thing's own are 3.00 to 3.30, 2.00 to 2.30.
+constexpr double kX0 = 3.0, kY0 = 2.0, kX1 = 3.3, kY1 = 2.3;
+
+TEST(HalfSeen, WhatCameUpBesideTheRobotIsTenCentimetresWiderAllRound) {
+  Room room;
+  room.see({2.2, 2.1, 0.0}, kX0, kY0, kX1, kY1);  // 0.8 m ahead, never seen before
+  EXPECT_EQ(room.at(2.97, 2.1), CellState::kOccupied);
+  EXPECT_EQ(room.at(2.92, 2.1), CellState::kOccupied);
+  EXPECT_EQ(room.at(2.87, 2.1), CellState::kFree);
+  EXPECT_EQ(room.at(3.15, 2.38), CellState::kOccupied);
+  EXPECT_EQ(room.at(3.15, 2.43), CellState::kFree);
+  EXPECT_EQ(room.at(2.92, 1.92), CellState::kFree) << "round corners: 0.14 m off";
+}
+
+TEST(HalfSeen, WhatWasInViewFromFartherAwayIsAsWideAsItIsSeenAndStaysSoWhenTheRobotComesNear) {
+  Room room;
+  room.see({1.0, 2.1, 0.0}, kX0, kY0, kX1, kY1);  // 2 m ahead
+  EXPECT_EQ(room.at(2.92, 2.1), CellState::kFree);
+  room.see({2.2, 2.1, 0.0}, kX0, kY0, kX1, kY1);
+  EXPECT_EQ(room.at(2.92, 2.1), CellState::kFree);
+  // Past it, its far side comes into view, which is the same thing's.
+  room.see({3.2, 1.5, 1.5}, kX0, kY0, kX1 + 0.15, kY1);
+  EXPECT_EQ(room.at(3.52, 2.1), CellState::kFree);
+}
+
+TEST(HalfSeen, FromFartherAwayButNotInViewNothingWasSeenOfIt) {
+  Room room;
+  room.see({1.0, 2.1, 1.5}, kX0, kY0, kX1, kY1);  // 2 m away, to the right of the robot
+  EXPECT_EQ(room.at(2.92, 2.1), CellState::kOccupied);
+  room.see({1.0, 2.1, 0.1}, kX0, kY0, kX1, kY1);  // it has turned to it
+  EXPECT_EQ(room.at(2.92, 2.1), CellState::kFree);
+}
+
+TEST(HalfSeen, SomebodyWhoWasSeenWholeAndSteppedUpIsHalfSeenThere) {
+  Room room;
+  room.see({1.0, 2.1, 0.0}, kX0, kY0, kX1, kY1);
+  EXPECT_EQ(room.at(2.92, 2.1), CellState::kFree);
+  room.see({1.0, 2.1, 0.0}, 1.7, kY0, 2.0, kY1);  // 0.7 m ahead now
+  EXPECT_EQ(room.at(1.62, 2.1), CellState::kOccupied);
+  // And back where he was, which the camera saw empty meanwhile: in view again from 2 m.
+  room.see({2.2, 2.1, 0.0}, kX0, kY0, kX1, kY1);
+  EXPECT_EQ(room.at(2.92, 2.1), CellState::kOccupied) << "0.8 m ahead of the robot that drove up meanwhile";
+}
+
+TEST(HalfSeen, WallsOfTheMapThatLieAFewCellsOffAndWideThingsAreAsTheyAre) {
+  Room room;
+  room.see({1.0, 3.2, 1.57}, 0.5, 3.85, 3.0, 3.95);  // beside the room's upper wall
+  EXPECT_EQ(room.at(1.0, 3.77), CellState::kFree);
+  Room other;
+  other.see({2.2, 2.1, 0.0}, kX0, 1.0, kX1, 3.0);  // 2 m wide
+  EXPECT_EQ(other.at(2.92, 2.1), CellState::kFree);
+}
+
+}  // namespace
+}  // namespace knav
