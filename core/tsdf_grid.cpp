@@ -261,8 +261,8 @@ float TsdfGrid::weight(int ix, int iy) const {
   return static_cast<float>(weight_[index(ix, iy)]) / weight_unit_;
 }
 
-void TsdfGrid::add(const TsdfObservation& observation) { apply<true>(observation); }
-void TsdfGrid::remove(const TsdfObservation& observation) { apply<false>(observation); }
+void TsdfGrid::add(const TsdfObservation& observation) { apply<true>(observation, {}); }
+void TsdfGrid::remove(const TsdfObservation& observation, const TsdfRing& part) { apply<false>(observation, part); }
 
 /// How far a row of cells takes part in an observation.
 double TsdfGrid::row_reach_m(const TsdfObservation& o, int iy) const {
@@ -273,10 +273,11 @@ double TsdfGrid::row_reach_m(const TsdfObservation& o, int iy) const {
 }
 
 template <bool kAdd>
-void TsdfGrid::apply(const TsdfObservation& o) {
+void TsdfGrid::apply(const TsdfObservation& o, const TsdfRing& part) {
   if (!(o.reach_m > 0.0f)) return;
   const View view(o);
-  const int radius = static_cast<int>(o.reach_m / config_.resolution_m) + 2;
+  const double most_m = std::min(o.reach_m, part.to_m);
+  const int radius = static_cast<int>(most_m / config_.resolution_m) + 2;
   const int sensor_y = cell_of(o.T_map_sensor.y_m);
   const auto cos_yaw = static_cast<float>(std::cos(o.T_map_sensor.yaw_rad));
   const auto sin_yaw = static_cast<float>(std::sin(o.T_map_sensor.yaw_rad));
@@ -286,11 +287,11 @@ void TsdfGrid::apply(const TsdfObservation& o) {
   for (int iy = low_y; iy < high_y; ++iy) {
     double low = 0.0, high = 0.0;
     TsdfChange change;
-    if (view.span(center_m(iy) - o.T_map_sensor.y_m, row_reach_m(o, iy), &low, &high)) {
+    if (view.span(center_m(iy) - o.T_map_sensor.y_m, std::min(row_reach_m(o, iy), most_m), &low, &high)) {
       // Whole groups of eight, which vector code takes at once.
       const int from = std::max(first_x_, (cell_of(o.T_map_sensor.x_m + low) - 1) & ~7);
       const int to = std::min(first_x_ + size_, (cell_of(o.T_map_sensor.x_m + high) + 9) & ~7);
-      if (from < to) change = apply_row<kAdd>(o, cos_yaw, sin_yaw, iy, from, to);
+      if (from < to) change = apply_row<kAdd>(o, cos_yaw, sin_yaw, iy, from, to, part);
     }
     // A row of quads stands on two rows of cells.
     if (!below.empty() || !change.empty()) {
@@ -302,7 +303,8 @@ void TsdfGrid::apply(const TsdfObservation& o) {
 }
 
 template <bool kAdd>
-TsdfChange TsdfGrid::apply_row(const TsdfObservation& o, float cos_yaw, float sin_yaw, int iy, int from_x, int to_x) {
+TsdfChange TsdfGrid::apply_row(const TsdfObservation& o, float cos_yaw, float sin_yaw, int iy, int from_x, int to_x,
+                               const TsdfRing& part) {
   // Offsets are counted from the sensor's own cell, an absolute index: a cell's numbers do not depend on
   // where the window lies, so removal after scrolling repeats them to the bit.
   const int sensor_x = cell_of(o.T_map_sensor.x_m), sensor_y = cell_of(o.T_map_sensor.y_m);
@@ -325,6 +327,12 @@ TsdfChange TsdfGrid::apply_row(const TsdfObservation& o, float cos_yaw, float si
     p.column_shift = 0.5f - o.angle_min_rad / o.angle_increment_rad;
     project_row_angular(p, from_x - sensor_x, count, row_column_.data(), row_distance_m_.data(),
                         row_angle_rad_.data());
+  }
+  if (!part.all()) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      const float d = row_distance_m_[i];
+      row_column_[i] = d >= part.from_m && d < part.to_m ? row_column_[i] : -1;
+    }
   }
   TsdfChange all;
   for (int x = from_x; x < to_x;) {  // the torus cuts a row in two pieces at most

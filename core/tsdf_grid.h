@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -58,6 +60,12 @@ struct TsdfConfig {
   double observation_capacity() const { return 2147483647.0 / largest_weight(); }
 };
 
+/// What an observation says of cells at these distances from its sensor: from_m <= distance < to_m.
+struct TsdfRing {
+  float from_m = 0.0f, to_m = std::numeric_limits<float>::infinity();
+  bool all() const { return from_m <= 0.0f && std::isinf(to_m); }
+};
+
 /// The projective truncated signed distance map of paper section III.D, as a torus that scrolls with the
 /// robot.
 ///
@@ -89,7 +97,8 @@ class TsdfGrid {
   /// Equations 2-6. The observation's sequence must be larger than any before it.
   void add(const TsdfObservation& observation);
   /// Equations 8, 9. The observation must have been added, and not been removed, since the last clear().
-  void remove(const TsdfObservation& observation);
+  /// @param part  only this. The rest stays, and has to be removed by itself.
+  void remove(const TsdfObservation& observation, const TsdfRing& part = {});
 
   double resolution_m() const { return config_.resolution_m; }
   int size_cells() const { return size_; }
@@ -146,10 +155,10 @@ class TsdfGrid {
 
  private:
   template <bool kAdd>
-  void apply(const TsdfObservation& observation);
+  void apply(const TsdfObservation& observation, const TsdfRing& part);
   double row_reach_m(const TsdfObservation& observation, int iy) const;
   template <bool kAdd>
-  TsdfChange apply_row(const TsdfObservation& observation, float cos_yaw, float sin_yaw, int iy, int from_x, int to_x);
+  TsdfChange apply_row(const TsdfObservation& observation, float cos_yaw, float sin_yaw, int iy, int from_x, int to_x, const TsdfRing& part);
   void rebuild_quads(int iy, int from_x, int to_x);
   void reset_cell(int ix, int iy, std::uint32_t next_sequence);
 

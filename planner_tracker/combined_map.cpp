@@ -123,7 +123,8 @@ void CombinedMap::update_clearance(const CellWindow& window, MapLayer* layer) {
   distance_.update(g.width_cells, g.height_cells, bytes(layer->state), kOpen, layer->surface.data(), window, layer->squared.data());
 }
 
-void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local, double now_s, const Pose2& T_map_robot) {
+void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local, double now_s, const Pose2& T_map_robot,
+                            const std::vector<Point2>& may_stand_at) {
   if (empty() || local.value.size() != local.geometry.cell_count() || !is_finite(T_map_local)) return;
   const GridGeometry& g = global_.geometry;
   const GridGeometry& l = local.geometry;
@@ -155,6 +156,7 @@ void CombinedMap::set_local(const OccupancyGrid& local, const Pose2& T_map_local
   if (!window.empty()) {
     sample_local(local, T_map_local, window);
     half_seen_.widen(global_, window, T_map_robot, &local_cells_, &local_surface_);
+    half_seen_.put(may_stand_at, kBody_m, window, {T_map_robot.x_m, T_map_robot.y_m}, &local_cells_, &local_surface_);
   }
   apply(old_window.united(local_window_));
 }

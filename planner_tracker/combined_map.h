@@ -30,15 +30,16 @@ class CombinedMap {
   /// @param surface_cells  see MapLayer
   /// @param half_seen  what becomes of things that came up close to the robot; by default nothing
   CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s = 0.0, double surface_cells = 0.0,
-              HalfSeen half_seen = {0.0, 0.0});
+              HalfSeen half_seen = {0.0, 0.0, 0.0});
 
   /// @param occupancy may be empty if `distance` is not, and the other way round; @param keepout may be
   /// empty. Both given: a cell is free only if both say so. Throws UserError if both are empty or sizes do
   /// not fit.
   void set_global(const DistanceMap& distance, const OccupancyGrid& occupancy, const OccupancyGrid& keepout);
   /// Replaces the previous local map. Clearances are recomputed round the cells that changed.
-  /// @param T_map_robot  where the robot is, for what is half seen
-  void set_local(const OccupancyGrid& local, const Pose2& T_map_local, double now_s = 0.0, const Pose2& T_map_robot = {});
+  /// @param T_map_robot  where the robot is, for what is half seen @param may_stand_at  see Walkers
+  void set_local(const OccupancyGrid& local, const Pose2& T_map_local, double now_s = 0.0, const Pose2& T_map_robot = {},
+                 const std::vector<Point2>& may_stand_at = {});
   void clear_local();
   /// Forgets what is remembered off the local map within this distance of a point.
   void forget_round(const Point2& p, double round_m);

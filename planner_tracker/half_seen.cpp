@@ -95,16 +95,25 @@ void HalfSeen::widen(const MapLayer& global, const CellWindow& window, const Pos
       if (open_[at(window, ix, iy)] != 0 && collect_thing(window, at(window, ix, iy))) half_.insert(half_.end(), thing_.begin(), thing_.end());
     }
   }
-  const double r = wider_m_ / geometry_.resolution_m;
-  for (const auto& [cx, cy] : half_) {
-    any_round(window, cx, cy, static_cast<int>(r), [&](int x, int y) {
-      const std::size_t i = at(window, x, y);
-      if (std::hypot(x - cx, y - cy) > r || (*local)[i] == CellState::kOccupied) return false;
-      (*local)[i] = CellState::kOccupied;
-      (*surface)[i] = {};
-      return false;
-    });
-  }
+  for (const auto& [cx, cy] : half_) occupy(cx, cy, wider_m_, window, {T_map_robot.x_m, T_map_robot.y_m}, local, surface);
+}
+
+void HalfSeen::put(const std::vector<Point2>& middles, double radius_m, const CellWindow& window, const Point2& robot,
+                   std::vector<CellState>* local, std::vector<SurfaceOffset>* surface) const {
+  for (const Point2& p : middles) occupy(geometry_.cell_x(p.x_m), geometry_.cell_y(p.y_m), radius_m, window, robot, local, surface);
+}
+
+void HalfSeen::occupy(int cx, int cy, double radius_m, const CellWindow& window, const Point2& robot, std::vector<CellState>* local,
+                      std::vector<SurfaceOffset>* surface) const {
+  const double r = radius_m / geometry_.resolution_m;
+  any_round(window, cx, cy, static_cast<int>(r), [&](int x, int y) {
+    const std::size_t i = at(window, x, y);
+    const bool robots = std::hypot(geometry_.center_x_m(x) - robot.x_m, geometry_.center_y_m(y) - robot.y_m) < keep_off_m_;
+    if (robots || std::hypot(x - cx, y - cy) > r || (*local)[i] == CellState::kOccupied) return false;
+    (*local)[i] = CellState::kOccupied;
+    (*surface)[i] = {};
+    return false;
+  });
 }
 
 }  // namespace knav

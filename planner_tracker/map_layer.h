@@ -10,6 +10,8 @@
 
 namespace knav {
 
+constexpr double kBody_m = 0.25;  ///< radius of somebody
+
 enum class CellState : std::uint8_t { kUnknown = 0, kFree = 1, kOccupied = 2, kKeepout = 3 };
 
 /// One map with the clearance of each of its cells. Only free cells are open; unknown is never free.

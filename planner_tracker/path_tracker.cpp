@@ -11,7 +11,6 @@ constexpr double kNearEnd_m = 0.4;
 constexpr double kPast_m = 0.4;        ///< straight on, to be past what stands right beside the robot
 constexpr double kPastStep_rad = 0.1;
 constexpr double kAlong = 0.3;         ///< of turned_rad, where the turn is for looking along the way
-constexpr double kBody_m = 0.25;        ///< of somebody who walks
 constexpr double kWalkerAhead_s = 2.0, kWalkerStep_s = 0.2;
 constexpr double kHelps_m = 0.05;
 constexpr double kPassed_m = 0.12;     ///< before the end of that

@@ -53,7 +53,8 @@ const char* to_string(Activity activity) {
 PlannerTracker::State::State(const PlannerTrackerConfig& c)
     : config(c),
       map(c.preferred_radius_m() + kBeyondPreferred_m, c.clearance.occupied_threshold,
-          c.clearance.free_threshold, c.planning.closed_memory_s, 0.0, {c.clearance.half_seen_m, c.clearance.half_seen_within_m}),
+          c.clearance.free_threshold, c.planning.closed_memory_s, 0.0, 
+          {c.clearance.half_seen_m, c.clearance.half_seen_within_m, c.hard_radius_m()}),
       keeper(c),
       tracker(c),
       moves(c, tracker),
@@ -77,7 +78,7 @@ void PlannerTracker::set_map(const DistanceMap& distance, const OccupancyGrid& o
 
 void PlannerTracker::set_local_map(const OccupancyGrid& local, const Pose2& T_map_local) {
   State& s = *state_;
-  s.map.set_local(local, T_map_local, s.last_step_s, s.input.T_map_base);
+  s.map.set_local(local, T_map_local, s.last_step_s, s.input.T_map_base, s.walkers.may_stand_at());
   if (s.map.empty()) return;
   s.moving.update(s.map.global(), s.map.combined(), s.map.local_window(), {s.input.T_map_base.x_m, s.input.T_map_base.y_m}, s.last_step_s);
   s.walkers.update(s.moving.points(), s.map.combined(), s.input.T_map_base, s.last_step_s);

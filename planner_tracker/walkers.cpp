@@ -14,6 +14,8 @@ constexpr double kWalked_m = 0.4;     ///< from where he began
 constexpr double kSlowest_mps = 0.25, kFastest_mps = 2.0;
 constexpr double kForgotten_s = 3.0;
 constexpr double kMissed_s = 0.5;     ///< in view and not seen for so long: he is not there
+constexpr double kMayStand_s = 6.0;   ///< so long after he was lost
+constexpr double kWentOn_s = 0.5, kWentOnStep_s = 0.25;
 constexpr double kHalfView_rad = 0.45, kViewFrom_m = 0.7, kViewTo_m = 4.0;
 
 double away_m(const Point2& a, const Point2& b) { return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m); }
@@ -56,6 +58,7 @@ void Walkers::update(const std::vector<Point2>& moving, const MapLayer& layer, c
   cluster(moving);
   // Out of view the local map keeps him where he was: nothing was seen of him there.
   clusters_.erase(std::remove_if(clusters_.begin(), clusters_.end(), [&](const Point2& c) { return !in_view(T_map_robot, c); }), clusters_.end());
+  lose(T_map_robot, now_s);
   for (Track& track : tracks_) {
     const Point2 expected = at(track, now_s);
     auto nearest = clusters_.end();
@@ -79,6 +82,29 @@ void Walkers::update(const std::vector<Point2>& moving, const MapLayer& layer, c
   };
   tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), gone), tracks_.end());
   for (const Point2& c : clusters_) tracks_.push_back({c, {0.0, 0.0}, c, now_s, false});
+}
+
+/// Whom no cluster shows any more, and who is out of view, may stand anywhere on the next bit of his way.
+void Walkers::lose(const Pose2& T_map_robot, double now_s) {
+  const auto shown = [&](const Point2& p) {
+    return std::any_of(clusters_.begin(), clusters_.end(), [&](const Point2& c) { return away_m(c, p) < kSame_m; });
+  };
+  for (const Track& track : tracks_) {
+    const bool known = std::any_of(lost_.begin(), lost_.end(), [&](const Track& l) { return l.seen_s == track.seen_s && away_m(l.at, track.at) < 1e-6; });
+    if (track.walks && !known && track.seen_s < now_s && !in_view(T_map_robot, track.at) && !shown(track.at)) lost_.push_back(track);
+  }
+  const auto found = [&](const Track& l) {
+    const double age_s = now_s - l.seen_s;
+    return age_s < 0.0 || age_s > kMayStand_s || in_view(T_map_robot, l.at) || shown(l.at);
+  };
+  lost_.erase(std::remove_if(lost_.begin(), lost_.end(), found), lost_.end());
+  may_stand_at_.clear();
+  for (const Track& l : lost_) {
+    for (double t = 0.0; t <= kWentOn_s; t += kWentOnStep_s) {
+      const Point2 p{l.at.x_m + t * l.v_mps.x_m, l.at.y_m + t * l.v_mps.y_m};
+      if (!in_view(T_map_robot, p)) may_stand_at_.push_back(p);
+    }
+  }
 }
 
 void Walkers::expected(double now_s, double memory_s, std::vector<Walker>* walkers) const {

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "core/pose2.h"
-#include "planner_tracker/combined_map.h"
+#include "planner_tracker/map_layer.h"
 
 namespace knav {
 
@@ -20,11 +20,17 @@ bool in_view(const Pose2& T_map_robot, const Point2& at);
 /// round the robot, and the local map has him where he was seen last.
 class Walkers {
  public:
-  void clear() { tracks_.clear(); }
+  void clear() {
+    tracks_.clear();
+    lost_.clear();
+  }
   /// Call after every new local map. @param moving  see MovingCells @param layer  the combined map
   void update(const std::vector<Point2>& moving, const MapLayer& layer, const Pose2& T_map_robot, double now_s);
   /// Where they are expected now: whoever was seen walking within `memory_s`, straight on at his speed.
   void expected(double now_s, double memory_s, std::vector<Walker>* walkers) const;
+  /// Middles of places, each as wide as somebody, where one who walked out of view may have stopped: from where he was seen last on for
+  /// the next half second of his way. Until they are seen again, for some seconds at most; the local map has none of them.
+  const std::vector<Point2>& may_stand_at() const { return may_stand_at_; }
 
  private:
   struct Track {
@@ -35,8 +41,11 @@ class Walkers {
   };
   void cluster(const std::vector<Point2>& moving);
   static Point2 at(const Track& track, double now_s);
+  void lose(const Pose2& T_map_robot, double now_s);
 
   std::vector<Track> tracks_;
+  std::vector<Track> lost_;  ///< walked out of view
+  std::vector<Point2> may_stand_at_;
   std::vector<Point2> clusters_;  ///< their middles
   std::vector<std::size_t> open_, left_;  ///< scratch of cluster()
 };

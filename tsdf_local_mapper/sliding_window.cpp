@@ -27,6 +27,7 @@ void SlidingWindow::push(TsdfGrid* grid, double clock_s, double travelled_m, boo
   slot.clock_s = clock_s;
   slot.travelled_m = travelled_m;
   slot.parked = parked;
+  slot.near_only = false;
   slot.observation.sequence = next_sequence_++;
   slot.observation.age_clock_s = static_cast<float>(clock_s);
   grid->add(slot.observation);
@@ -41,6 +42,18 @@ void SlidingWindow::expire(TsdfGrid* grid, double clock_s, double travelled_m) {
     if (!old && !far) break;
     remove(grid, 0);
   }
+  expire_far_parts(grid, travelled_m);
+}
+
+void SlidingWindow::expire_far_parts(TsdfGrid* grid, double travelled_m) {
+  if (config_.far_m <= 0.0) return;
+  for (; near_only_ < order_.size(); ++near_only_) {
+    Slot& slot = *slots_[order_[near_only_]];
+    if (travelled_m - slot.travelled_m <= config_.far_distance_m) break;
+    if (!slot.observation.pinhole) continue;
+    grid->remove(slot.observation, {static_cast<float>(config_.far_m)});
+    slot.near_only = true;
+  }
 }
 
 int SlidingWindow::first_after(std::uint32_t sequence) const {
@@ -53,11 +66,14 @@ int SlidingWindow::first_after(std::uint32_t sequence) const {
 void SlidingWindow::clear() {
   free_.insert(free_.begin(), order_.begin(), order_.end());
   order_.clear();
+  near_only_ = 0;
 }
 
 void SlidingWindow::remove(TsdfGrid* grid, std::size_t position) {
   const std::size_t index = order_[position];
-  grid->remove(slots_[index]->observation);
+  const Slot& slot = *slots_[index];
+  grid->remove(slot.observation, slot.near_only ? TsdfRing{0.0f, static_cast<float>(config_.far_m)} : TsdfRing{});
+  if (position < near_only_) --near_only_;
   order_.erase(order_.begin() + static_cast<std::ptrdiff_t>(position));
   free_.insert(free_.begin(), index);  // not on top: that is the scratch slot
 }

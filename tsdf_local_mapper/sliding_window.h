@@ -39,13 +39,16 @@ class SlidingWindow {
     TsdfObservation observation;
     double clock_s = 0.0, travelled_m = 0.0;
     bool parked = false;
+    bool near_only = false;  ///< its far part has left already
   };
   void remove(TsdfGrid* grid, std::size_t position);
+  void expire_far_parts(TsdfGrid* grid, double travelled_m);
 
   WindowConfig config_;
   std::vector<std::unique_ptr<Slot>> slots_;  ///< never freed: no allocation once the window is full
   std::vector<std::size_t> order_;            ///< slots in use, oldest first
   std::vector<std::size_t> free_;
+  std::size_t near_only_ = 0;  ///< so many of the oldest have been asked for their far parts
   std::uint32_t next_sequence_ = 1;
 };
 

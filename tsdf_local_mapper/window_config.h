@@ -9,6 +9,8 @@ namespace knav {
 struct WindowConfig {
   double duration_s = 300.0;
   double distance_m = 80.0;
+  double far_m = 6.0;
+  double far_distance_m = 20.0;
   std::string clock = "moving";
   int max_observations = 8000;
   int parked_observations = 60;
@@ -17,6 +19,10 @@ struct WindowConfig {
   void visit(Visitor& v) {
     v.number("duration_s", duration_s, 1, 3600, "s", "An observation leaves the map after this long.");
     v.number("distance_m", distance_m, 1, 200, "m", "An observation leaves after the robot drove this far.");
+    v.number("far_m", far_m, 0, 100, "m",
+             "DepthProfile: what a frame says of places farther from the camera than this leaves sooner, as a depth camera errs with the range squared; 0 = no "
+             "sooner than the rest.");
+    v.number("far_distance_m", far_distance_m, 1, 200, "m", "Namely after the robot drove this far.");
     v.choice("clock", clock, {"paper", "moving"},
              "What duration_s counts: all time, or only the time the robot moves (a parked robot keeps its "
              "walls).");

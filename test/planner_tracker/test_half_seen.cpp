@@ -10,7 +10,7 @@ namespace {
 /// A room 6 x 4 m with one thing in it that only the local map has.
 class Room {
  public:
-  Room() : map_(0.7, 65, 25, 0.0, 0.0, {0.1, 1.3}), grid_(room(6.0, 4.0)) { map_.set_global({}, grid_, {}); }
+  Room() : map_(0.7, 65, 25, 0.0, 0.0, {0.1, 1.3, 0.24}), grid_(room(6.0, 4.0)) { map_.set_global({}, grid_, {}); }
 
   /// Where the robot is, looking along x, and the thing: x0, y0, x1, y1.
   void see(const Pose2& T_map_robot, double x0, double y0, double x1, double y1) {

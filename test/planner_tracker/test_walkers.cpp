@@ -13,7 +13,7 @@ namespace {
 /// A room of 8 x 6 m whose local map is the whole of it, five times a second; the robot stands at (2, 3) and looks along +x.
 class WatchedRoom : public ::testing::Test {
  protected:
-  WatchedRoom() : map_(0.7, 65, 25), grid_(room(8.0, 6.0)) {
+  WatchedRoom() : map_(0.7, 65, 25, 0.0, 0.0, {0.0, 0.0, 0.24}), grid_(room(8.0, 6.0)) {
     map_.set_global({}, grid_, {});
     cells_.reset(map_.global());
   }
@@ -81,6 +81,31 @@ TEST_F(WatchedRoom, FurnitureThatComesIntoViewBitByBitDoesNotWalk) {
     see(local);
     EXPECT_TRUE(expected().empty()) << x_m;
   }
+}
+
+TEST_F(WatchedRoom, WhoWalkedOutOfViewMayHaveStoppedOnTheNextBitOfHisWayUntilThatIsSeen) {
+  double y_m = 2.0;
+  for (int i = 0; i < 8; ++i) see(with_somebody({4.0, y_m += 0.7 * 0.2}));
+  ASSERT_EQ(expected().size(), 1u);
+  EXPECT_TRUE(walkers_.may_stand_at().empty()) << "he is in view";
+  robot_.yaw_rad = -kPi / 2;  // looks away
+  const OccupancyGrid last = with_somebody({4.0, y_m});
+  see(last);
+  see(last);
+  const auto& places = walkers_.may_stand_at();
+  ASSERT_EQ(places.size(), 3u);
+  EXPECT_NEAR(places[0].x_m, 4.0 - 0.2, 0.15) << "the side that he turned to the robot";
+  EXPECT_NEAR(places[0].y_m, y_m, 0.15);
+  EXPECT_NEAR(places[2].y_m - places[0].y_m, 0.35, 0.08) << "half a second at 0.7 m/s";
+  // Laid over the map they close it, but not where the robot is.
+  const auto state = [&](const Point2& p) { return map_.combined().at(grid_.geometry.cell_x(p.x_m), grid_.geometry.cell_y(p.y_m)); };
+  const Point2 ahead{places[2].x_m, places[2].y_m + 0.15};
+  EXPECT_EQ(state(ahead), CellState::kFree);
+  map_.set_local(last, {}, now_s_ += 0.2, robot_, places);
+  EXPECT_EQ(state(ahead), CellState::kOccupied);
+  robot_.yaw_rad = 0.4;  // looks there again: what is there is in the local map
+  see(last);
+  EXPECT_TRUE(walkers_.may_stand_at().empty());
 }
 
 class WalkerAtTheSide : public ::testing::Test {

@@ -69,6 +69,25 @@ TEST_F(TwoDoors, ADoorFoundShutIsNotTurnedBackForBecauseTheOneAheadSeemsClosedFr
   EXPECT_LT(keeper_.path().end().y_m, 12.0) << "both were seen, and the first is open now";
 }
 
+TEST_F(TwoDoors, ForSomebodyInTheDoorAheadTheRobotWaitsTenSecondsWhereTheWayBackWasFoundShut) {
+  for (double t = 1.0; t < config_.planning.hold_s + kToSee_s; t += 0.5) look(0.0, t);
+  ASSERT_TRUE(goes_round());
+  OccupancyGrid seen = rooms(0.5);  // just wide enough, it seems
+  fill(&seen, 5.95, 17.0, 6.05, 18.0, 100);
+  map_.set_local(seen, Pose2{});
+  const Point2 before_it = keeper_.path().point_at(keeper_.path().at_m() + 13.0);
+  const std::vector<Point2> trail{{5.9, 17.4}};
+  double waited_s = 0.0;
+  while (waited_s < 60.0) {
+    keeper_.replan(map_, {before_it.x_m, before_it.y_m, 0.0}, {10.0, 3.0}, 120.0 + waited_s, trail);
+    if (keeper_.path().end().y_m < 12.0) break;
+    waited_s += 0.5;
+  }
+  // The way back counts as 40 m: 0.15 x 40 m / 0.6 m/s = 10 s, and the few metres to where the robot sees the door.
+  EXPECT_GE(waited_s, 10.0);
+  EXPECT_LE(waited_s, 10.0 + kToSee_s);
+}
+
 TEST_F(TwoDoors, WhatIsLeftOfTheWayIsTheSameWhetherItIsSeenOpenOrClosed) {
   look(1.0, 0.5);
   const double left_m = keeper_.remaining_m();
