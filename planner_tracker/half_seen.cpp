@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "planner_tracker/walkers.h"
+
 namespace knav {
 namespace {
 
-constexpr double kHalfView_rad = 0.45;  ///< of a camera of 57 degrees, less what its edges may miss
-constexpr double kViewTo_m = 6.0;
+constexpr double kSeesTo_m = 6.0;
 constexpr double kLookAt_m = 3.0;       ///< farther from the robot nothing is widened
 constexpr int kGap_cells = 3;           ///< between cells of one thing; as near to a surface of the global map it is that surface
 constexpr int kShift_cells = 2;         ///< a thing shifts by so much from one local map to the next
@@ -43,8 +44,7 @@ void HalfSeen::see(const CellWindow& window, const Pose2& T_map_robot, const std
       const CellState state = local[at(window, ix, iy)];
       if (state == CellState::kOccupied && whole == 0) {
         const Point2 p = T_robot_map * Point2{geometry_.center_x_m(ix), geometry_.center_y_m(iy)};
-        const double distance = std::hypot(p.x_m, p.y_m);
-        whole = distance > within_m_ && distance < kViewTo_m && std::abs(std::atan2(p.y_m, p.x_m)) < kHalfView_rad ? 1 : 0;
+        whole = in_view(p, within_m_, kSeesTo_m) ? 1 : 0;
       } else if (state == CellState::kFree && whole != 0) {
         const auto occupied = [&](int x, int y) { return local[at(window, x, y)] == CellState::kOccupied; };
         whole = any_round(window, ix, iy, kShift_cells, occupied) ? 1 : 0;

@@ -16,17 +16,19 @@ constexpr double kForgotten_s = 3.0;
 constexpr double kMissed_s = 0.5;     ///< in view and not seen for so long: he is not there
 constexpr double kMayStand_s = 6.0;   ///< so long after he was lost
 constexpr double kWentOn_s = 0.5, kWentOnStep_s = 0.25;
-constexpr double kHalfView_rad = 0.45, kViewFrom_m = 0.7, kViewTo_m = 4.0;
+constexpr double kHalfView_rad = 0.45;  ///< less than 57 degrees, by what the edges may miss
+constexpr double kViewFrom_m = 0.7, kViewTo_m = 4.0;
 
 double away_m(const Point2& a, const Point2& b) { return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m); }
 
 }  // namespace
 
-bool in_view(const Pose2& T_map_robot, const Point2& at) {
-  const Point2 p = T_map_robot.inverse() * at;
-  const double distance = std::hypot(p.x_m, p.y_m);
-  return distance > kViewFrom_m && distance < kViewTo_m && std::abs(std::atan2(p.y_m, p.x_m)) < kHalfView_rad;
+bool in_view(const Point2& in_robot, double from_m, double to_m) {
+  const double distance = std::hypot(in_robot.x_m, in_robot.y_m);
+  return distance > from_m && distance < to_m && std::abs(std::atan2(in_robot.y_m, in_robot.x_m)) < kHalfView_rad;
 }
+
+bool in_view(const Pose2& T_map_robot, const Point2& at) { return in_view(T_map_robot.inverse() * at, kViewFrom_m, kViewTo_m); }
 
 Point2 Walkers::at(const Track& track, double now_s) {
   const double dt = now_s - track.seen_s;

@@ -13,7 +13,9 @@ struct Walker {
   Point2 v_mps;
 };
 
-/// True if a camera of 57 degrees that looks ahead has this point in view, and not too near.
+/// True if a camera of 57 degrees that looks ahead has this point of the robot's frame in view, and it lies between these distances.
+bool in_view(const Point2& in_robot, double from_m, double to_m);
+/// The same for a point of the map, not too near and not too far for somebody to be made out.
 bool in_view(const Pose2& T_map_robot, const Point2& at);
 
 /// Follows who walks, and says where he is to be expected once the robot looks elsewhere: a Kinect sees a sixth of what is

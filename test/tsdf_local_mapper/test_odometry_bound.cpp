@@ -38,6 +38,38 @@ TEST(OdometryBound, WithEnoughInViewAlignmentDecides) {
   EXPECT_EQ(after_a_turn(off, 0.0).yaw_rad, 0.0);
 }
 
+/// So many windows of 2 s in which the estimate turns 1 % less than odometry, with enough in view, then one with little in view in
+/// which it does not turn: by how much it is let differ from odometry over that.
+double let_differ_rad(const OdometryBoundConfig& config, int windows) {
+  MotionModelConfig motion;
+  motion.rotation_per_rotation = 0.1;
+  OdometryBound bound(config, motion);
+  int i = 0;
+  double yaw = 0.0;
+  for (; i <= 20 * windows; ++i) {
+    Pose2 T_local_base{0.0, 0.0, normalize_angle_rad(yaw = 0.99 * 0.02 * i)};
+    EXPECT_FALSE(bound.bound(10.0 + kFrame_s * i, {0.0, 0.0, normalize_angle_rad(0.02 * i)}, 0.8, &T_local_base, &sd));
+  }
+  Pose2 T_local_base;
+  for (const int end = i + 20; i < end; ++i) {
+    T_local_base = {0.0, 0.0, normalize_angle_rad(yaw)};
+    bound.bound(10.0 + kFrame_s * i, {0.0, 0.0, normalize_angle_rad(0.02 * i)}, 0.25, &T_local_base, &sd);
+  }
+  return std::abs(normalize_angle_rad(yaw + 0.4 - T_local_base.yaw_rad));
+}
+
+TEST(OdometryBound, OdometryThatWasFoundGoodIsWorthMoreThanTheMotionModelSays) {
+  // Each window is off by 0.004 of 0.4 rad, 0.1 of the model's deviations: 4 x 0.1 instead of 2 of them, half of that at half the coverage.
+  EXPECT_NEAR(let_differ_rad({}, 12), 0.5 * 0.4 * 0.04 + 0.0035, 1e-6);
+  EXPECT_NEAR(let_differ_rad({}, 8), 0.04 + 0.0035, 1e-6) << "too few windows to know";
+  OdometryBoundConfig off;
+  off.learned_sds = 0.0;
+  EXPECT_NEAR(let_differ_rad(off, 12), 0.04 + 0.0035, 1e-6);
+  OdometryBoundConfig wide;
+  wide.learned_sds = 50.0;
+  EXPECT_NEAR(let_differ_rad(wide, 12), 0.04 + 0.0035, 1e-6) << "never wider than the model's";
+}
+
 TEST(OdometryBound, IsMeasuredOverTheWindowAndNotFrameByFrame) {
   // Wheels 5 % too large, straight on: within 2 x 0.1 m/m at full coverage's edge, so nothing is drawn, however long it lasts.
   MotionModelConfig motion;
