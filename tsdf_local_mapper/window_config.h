@@ -12,7 +12,7 @@ struct WindowConfig {
   double far_m = 6.0;
   double far_distance_m = 20.0;
   std::string clock = "moving";
-  int max_observations = 8000;
+  int max_observations = 6000;
   int parked_observations = 60;
 
   template <class Visitor>
