@@ -10,8 +10,8 @@ namespace {
 
 constexpr double kSeesTo_m = 6.0;
 constexpr double kLookAt_m = 3.0;       ///< farther from the robot nothing is widened
-constexpr int kGap_cells = 3;           ///< between cells of one thing; as near to a surface of the global map it is that surface
-constexpr int kShift_cells = 2;         ///< a thing shifts by so much from one local map to the next
+constexpr double kGap_m = 0.15;         ///< between cells of one thing; as near to a surface of the global map it is that surface
+constexpr double kShift_m = 0.1;        ///< a thing shifts by so much from one local map to the next
 constexpr double kWidest_m = 0.8;       ///< what is wider is nobody
 
 template <class Any>
@@ -23,6 +23,8 @@ bool any_round(const CellWindow& window, int ix, int iy, int r, const Any& any) 
   }
   return false;
 }
+
+int cells(double length_m, const GridGeometry& geometry) { return static_cast<int>(std::lround(length_m / geometry.resolution_m)); }
 
 std::size_t at(const CellWindow& window, int ix, int iy) {
   return static_cast<std::size_t>(iy - window.y0) * static_cast<std::size_t>(window.width()) + static_cast<std::size_t>(ix - window.x0);
@@ -38,6 +40,7 @@ void HalfSeen::reset(const GridGeometry& geometry) {
 /// What is in view from far enough away has been seen whole; what is gone has not been seen any more.
 void HalfSeen::see(const CellWindow& window, const Pose2& T_map_robot, const std::vector<CellState>& local) {
   const Pose2 T_robot_map = T_map_robot.inverse();
+  const int shift = cells(kShift_m, geometry_);
   for (int iy = window.y0; iy < window.y1; ++iy) {
     for (int ix = window.x0; ix < window.x1; ++ix) {
       std::uint8_t& whole = whole_[geometry_.index(ix, iy)];
@@ -47,7 +50,7 @@ void HalfSeen::see(const CellWindow& window, const Pose2& T_map_robot, const std
         whole = in_view(p, within_m_, kSeesTo_m) ? 1 : 0;
       } else if (state == CellState::kFree && whole != 0) {
         const auto occupied = [&](int x, int y) { return local[at(window, x, y)] == CellState::kOccupied; };
-        whole = any_round(window, ix, iy, kShift_cells, occupied) ? 1 : 0;
+        whole = any_round(window, ix, iy, shift, occupied) ? 1 : 0;
       }
     }
   }
@@ -55,7 +58,7 @@ void HalfSeen::see(const CellWindow& window, const Pose2& T_map_robot, const std
 
 /// Takes the cells that belong with an open one into `thing_`. @return true if they are one half seen
 bool HalfSeen::collect_thing(const CellWindow& window, std::size_t first) {
-  const int width = window.width();
+  const int width = window.width(), shift = cells(kShift_m, geometry_), gap = cells(kGap_m, geometry_);
   thing_.assign(1, {window.x0 + static_cast<int>(first) % width, window.y0 + static_cast<int>(first) / width});
   open_[first] = 0;
   CellWindow extent;
@@ -63,8 +66,8 @@ bool HalfSeen::collect_thing(const CellWindow& window, std::size_t first) {
   for (std::size_t k = 0; k < thing_.size(); ++k) {
     const auto [ix, iy] = thing_[k];
     extent.include(ix, iy);
-    whole = whole || any_round(window, ix, iy, kShift_cells, [&](int x, int y) { return whole_[geometry_.index(x, y)] != 0; });
-    any_round(window, ix, iy, kGap_cells, [&](int x, int y) {
+    whole = whole || any_round(window, ix, iy, shift, [&](int x, int y) { return whole_[geometry_.index(x, y)] != 0; });
+    any_round(window, ix, iy, gap, [&](int x, int y) {
       std::uint8_t& open = open_[at(window, x, y)];
       if (open != 0) thing_.emplace_back(x, y);
       open = 0;
@@ -78,7 +81,7 @@ void HalfSeen::widen(const MapLayer& global, const CellWindow& window, const Pos
                      std::vector<SurfaceOffset>* surface) {
   if (whole_.empty()) return;
   see(window, T_map_robot, *local);
-  const int look = static_cast<int>(kLookAt_m / geometry_.resolution_m);
+  const int look = cells(kLookAt_m, geometry_), gap = cells(kGap_m, geometry_);
   const int rx = geometry_.cell_x(T_map_robot.x_m), ry = geometry_.cell_y(T_map_robot.y_m);
   const int x0 = std::max(window.x0, rx - look), x1 = std::min(window.x1, rx + look + 1);
   const int y0 = std::max(window.y0, ry - look), y1 = std::min(window.y1, ry + look + 1);
@@ -86,7 +89,7 @@ void HalfSeen::widen(const MapLayer& global, const CellWindow& window, const Pos
   for (int iy = y0; iy < y1; ++iy) {
     for (int ix = x0; ix < x1; ++ix) {
       const auto mapped = [&](int x, int y) { return global.state[geometry_.index(x, y)] == CellState::kOccupied; };
-      open_[at(window, ix, iy)] = (*local)[at(window, ix, iy)] == CellState::kOccupied && !any_round(window, ix, iy, kGap_cells, mapped) ? 1 : 0;
+      open_[at(window, ix, iy)] = (*local)[at(window, ix, iy)] == CellState::kOccupied && !any_round(window, ix, iy, gap, mapped) ? 1 : 0;
     }
   }
   half_.clear();

@@ -53,7 +53,7 @@ const char* to_string(Activity activity) {
 PlannerTracker::State::State(const PlannerTrackerConfig& c)
     : config(c),
       map(c.preferred_radius_m() + kBeyondPreferred_m, c.clearance.occupied_threshold,
-          c.clearance.free_threshold, c.planning.closed_memory_s, 0.0, 
+          c.clearance.free_threshold, c.planning.closed_memory_s, 0.0,
           {c.clearance.half_seen_m, c.clearance.half_seen_within_m, c.hard_radius_m()}),
       keeper(c),
       tracker(c),
