@@ -9,6 +9,7 @@ namespace knav {
 namespace {
 
 constexpr double kSeesTo_m = 6.0;
+constexpr double kOutlineTo_m = 2.5;    ///< from farther away an outline is wrong by centimetres
 constexpr double kLookAt_m = 3.0;       ///< farther from the robot nothing is widened
 constexpr double kGap_m = 0.15;         ///< between cells of one thing; as near to a surface of the global map it is that surface
 constexpr double kShift_m = 0.1;        ///< a thing shifts by so much from one local map to the next
@@ -34,30 +35,35 @@ std::size_t at(const CellWindow& window, int ix, int iy) {
 
 void HalfSeen::reset(const GridGeometry& geometry) {
   geometry_ = geometry;
-  whole_.assign(wider_m_ > 0.0 ? geometry.cell_count() : 0, 0);
+  seen_.assign(wider_m_ > 0.0 ? geometry.cell_count() : 0, Seen::kNo);
 }
 
 /// What is in view from far enough away has been seen whole; what is gone has not been seen any more.
-void HalfSeen::see(const CellWindow& window, const Pose2& T_map_robot, const std::vector<CellState>& local) {
-  const Pose2 T_robot_map = T_map_robot.inverse();
-  const int shift = cells(kShift_m, geometry_);
+void HalfSeen::see(const CellWindow& window, const Pose2& T_robot_map, const std::vector<CellState>& local) {
+  const int gap = cells(kGap_m, geometry_);
+  const auto occupied = [&](int x, int y) { return local[at(window, x, y)] == CellState::kOccupied; };
   for (int iy = window.y0; iy < window.y1; ++iy) {
     for (int ix = window.x0; ix < window.x1; ++ix) {
-      std::uint8_t& whole = whole_[geometry_.index(ix, iy)];
+      Seen& seen = seen_[geometry_.index(ix, iy)];
       const CellState state = local[at(window, ix, iy)];
-      if (state == CellState::kOccupied && whole == 0) {
-        const Point2 p = T_robot_map * Point2{geometry_.center_x_m(ix), geometry_.center_y_m(iy)};
-        whole = in_view(p, within_m_, kSeesTo_m) ? 1 : 0;
-      } else if (state == CellState::kFree && whole != 0) {
-        const auto occupied = [&](int x, int y) { return local[at(window, x, y)] == CellState::kOccupied; };
-        whole = any_round(window, ix, iy, shift, occupied) ? 1 : 0;
+      const bool look = state == CellState::kOccupied ? seen != Seen::kOutline : state == CellState::kFree && seen != Seen::kNo;
+      if (!look) continue;
+      const Point2 p = T_robot_map * Point2{geometry_.center_x_m(ix), geometry_.center_y_m(iy)};
+      if (state == CellState::kOccupied) {
+        if (in_view(p, within_m_, kOutlineTo_m)) {
+          seen = Seen::kOutline;
+        } else if (seen == Seen::kNo && in_view(p, within_m_, kSeesTo_m)) {
+          seen = Seen::kWhole;
+        }
+      } else if (in_view(p, within_m_, kSeesTo_m) || !any_round(window, ix, iy, gap, occupied)) {
+        seen = Seen::kNo;
       }
     }
   }
 }
 
-/// Takes the cells that belong with an open one into `thing_`. @return true if they are one half seen
-bool HalfSeen::collect_thing(const CellWindow& window, std::size_t first) {
+/// Takes the cells that belong with an open one into `thing_`.
+HalfSeen::Thing HalfSeen::collect_thing(const CellWindow& window, std::size_t first) {
   const int width = window.width(), shift = cells(kShift_m, geometry_), gap = cells(kGap_m, geometry_);
   thing_.assign(1, {window.x0 + static_cast<int>(first) % width, window.y0 + static_cast<int>(first) / width});
   open_[first] = 0;
@@ -66,7 +72,7 @@ bool HalfSeen::collect_thing(const CellWindow& window, std::size_t first) {
   for (std::size_t k = 0; k < thing_.size(); ++k) {
     const auto [ix, iy] = thing_[k];
     extent.include(ix, iy);
-    whole = whole || any_round(window, ix, iy, shift, [&](int x, int y) { return whole_[geometry_.index(x, y)] != 0; });
+    whole = whole || any_round(window, ix, iy, shift, [&](int x, int y) { return seen_[geometry_.index(x, y)] != Seen::kNo; });
     any_round(window, ix, iy, gap, [&](int x, int y) {
       std::uint8_t& open = open_[at(window, x, y)];
       if (open != 0) thing_.emplace_back(x, y);
@@ -74,13 +80,27 @@ bool HalfSeen::collect_thing(const CellWindow& window, std::size_t first) {
       return false;
     });
   }
-  return !whole && std::max(extent.width(), extent.height()) * geometry_.resolution_m <= kWidest_m;
+  if (std::max(extent.width(), extent.height()) * geometry_.resolution_m > kWidest_m) return Thing::kWide;
+  return whole ? Thing::kWhole : Thing::kHalfSeen;
+}
+
+/// Cells round the thing that were its outline when it was seen whole, and are free only since the camera looks past it from near.
+void HalfSeen::collect_outline(const CellWindow& window, const Pose2& T_robot_map, const std::vector<CellState>& local) {
+  for (const auto& [cx, cy] : thing_) {
+    any_round(window, cx, cy, cells(kGap_m, geometry_), [&](int x, int y) {
+      if (seen_[geometry_.index(x, y)] != Seen::kOutline || local[at(window, x, y)] == CellState::kOccupied) return false;
+      const Point2 p = T_robot_map * Point2{geometry_.center_x_m(x), geometry_.center_y_m(y)};
+      if (!in_view(p, within_m_, kSeesTo_m)) outline_.emplace_back(x, y);
+      return false;
+    });
+  }
 }
 
 void HalfSeen::widen(const MapLayer& global, const CellWindow& window, const Pose2& T_map_robot, std::vector<CellState>* local,
                      std::vector<SurfaceOffset>* surface) {
-  if (whole_.empty()) return;
-  see(window, T_map_robot, *local);
+  if (seen_.empty()) return;
+  const Pose2 T_robot_map = T_map_robot.inverse();
+  see(window, T_robot_map, *local);
   const int look = cells(kLookAt_m, geometry_), gap = cells(kGap_m, geometry_);
   const int rx = geometry_.cell_x(T_map_robot.x_m), ry = geometry_.cell_y(T_map_robot.y_m);
   const int x0 = std::max(window.x0, rx - look), x1 = std::min(window.x1, rx + look + 1);
@@ -93,12 +113,18 @@ void HalfSeen::widen(const MapLayer& global, const CellWindow& window, const Pos
     }
   }
   half_.clear();
+  outline_.clear();
   for (int iy = y0; iy < y1; ++iy) {
     for (int ix = x0; ix < x1; ++ix) {
-      if (open_[at(window, ix, iy)] != 0 && collect_thing(window, at(window, ix, iy))) half_.insert(half_.end(), thing_.begin(), thing_.end());
+      if (open_[at(window, ix, iy)] == 0) continue;
+      const Thing thing = collect_thing(window, at(window, ix, iy));
+      if (thing == Thing::kHalfSeen) half_.insert(half_.end(), thing_.begin(), thing_.end());
+      if (thing == Thing::kWhole) collect_outline(window, T_robot_map, *local);
     }
   }
-  for (const auto& [cx, cy] : half_) occupy(cx, cy, wider_m_, window, {T_map_robot.x_m, T_map_robot.y_m}, local, surface);
+  const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
+  for (const auto& [cx, cy] : half_) occupy(cx, cy, wider_m_, window, robot, local, surface);
+  for (const auto& [cx, cy] : outline_) occupy(cx, cy, 0.0, window, robot, local, surface);
 }
 
 void HalfSeen::put(const std::vector<Point2>& middles, double radius_m, const CellWindow& window, const Point2& robot,

@@ -11,7 +11,8 @@ namespace knav {
 
 /// Things that came up so near to the robot that the camera never had more in view than their feet: somebody who stepped beside it
 /// while it looked elsewhere. A level Kinect 0.3 m above the floor sees 0.6 m high at a distance of 0.7 m, legs, and a body is 7 cm
-/// wider than they are, all round. So such a thing counts as wider until it has been seen from farther away.
+/// wider than they are, all round. So such a thing counts as wider until it has been seen from farther away. And what was seen from
+/// farther away keeps the outline that it had then: nearer, the camera looks past a body's sides, above which it does not see.
 class HalfSeen {
  public:
   /// @param wider_m  by so much; 0 = off  @param within_m  what is seen from farther away is seen whole
@@ -30,17 +31,22 @@ class HalfSeen {
  private:
   using Cell = std::pair<int, int>;
 
-  void see(const CellWindow& window, const Pose2& T_map_robot, const std::vector<CellState>& local);
-  bool collect_thing(const CellWindow& window, std::size_t first);
+  enum class Seen : std::uint8_t { kNo = 0, kWhole = 1, kOutline = 2 };
+  /// Things in the window that are no wider than somebody, and not the global map's.
+  enum class Thing { kWide, kHalfSeen, kWhole };
+
+  void see(const CellWindow& window, const Pose2& T_robot_map, const std::vector<CellState>& local);
+  Thing collect_thing(const CellWindow& window, std::size_t first);
+  void collect_outline(const CellWindow& window, const Pose2& T_robot_map, const std::vector<CellState>& local);
   void occupy(int cx, int cy, double radius_m, const CellWindow& window, const Point2& robot, std::vector<CellState>* local,
               std::vector<SurfaceOffset>* surface) const;
 
   double wider_m_, within_m_, keep_off_m_;
   GridGeometry geometry_;
-  std::vector<std::uint8_t> whole_;  ///< per cell of the map: occupied when it was in view from farther away than within_m
+  std::vector<Seen> seen_;  ///< per cell of the map: occupied when it was in view from farther away than within_m; not far from there
   // Scratch of widen().
   std::vector<std::uint8_t> open_;   ///< per cell of the window: occupied, not the global map's, and of no thing yet
-  std::vector<Cell> thing_, half_;
+  std::vector<Cell> thing_, half_, outline_;
 };
 
 }  // namespace knav

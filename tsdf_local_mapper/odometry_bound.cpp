@@ -8,6 +8,7 @@ namespace {
 
 constexpr std::size_t kEntries = 1024;                   // of a window; at a higher rate it is shorter
 constexpr double kLeast_m = 0.005, kLeast_rad = 0.0035;  // what the grid resolves
+constexpr double kAlways_sds = 2.0;                       // of those learned, however little is in view: odometry errs by as much often
 constexpr double kMoved_m = 0.01, kMoved_rad = 0.02;     // of the motion model's deviations: less says nothing of them
 
 }  // namespace
@@ -31,8 +32,9 @@ OdometryBound::Difference OdometryBound::difference(const Entry& then, const Ent
 bool OdometryBound::draw(const Entry& then, double coverage, Entry* now, MotionNoise* odometry_sd) const {
   const Difference d = difference(then, *now);
   const auto sds = [&](const OdometryQuality& quality) {
-    const double learned = config_.learned_sds > 0.0 ? config_.learned_sds * quality.rms_sds() : config_.sds;
-    return std::min(config_.sds, learned) * coverage / config_.coverage;
+    const double share = coverage / config_.coverage, by_model = config_.sds * share;
+    if (config_.learned_sds <= 0.0) return by_model;
+    return std::min(by_model, std::max(config_.learned_sds * share, kAlways_sds) * quality.rms_sds());
   };
   const double most_m = sds(distance_quality_) * d.sd_m + kLeast_m, most_rad = sds(turn_quality_) * d.sd_rad + kLeast_rad;
   if (d.off_m <= most_m && std::fabs(d.off_rad) <= most_rad) return false;

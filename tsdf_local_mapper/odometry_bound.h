@@ -16,7 +16,7 @@ struct OdometryBoundConfig {
   double coverage = 0.5;
   double window_s = 2.0;
   double sds = 2.0;
-  double learned_sds = 4.0;
+  double learned_sds = 6.0;
 
   template <class Visitor>
   void visit(Visitor& v) {

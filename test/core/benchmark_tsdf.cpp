@@ -74,6 +74,21 @@ void integrate_and_remove(benchmark::State& state) {
 }
 BENCHMARK(integrate_and_remove)->Arg(3)->Arg(10)->Arg(18)->Unit(benchmark::kMicrosecond)->Apply(shortest);
 
+/// As the sliding window does: the part beyond window/far_m leaves by itself.
+void integrate_and_remove_in_two_parts(benchmark::State& state) {
+  TsdfGrid grid(TsdfConfig{}, 25.0);
+  std::uint32_t sequence = 0;
+  TsdfObservation o = kinect_observation(static_cast<double>(state.range(0)), 1);
+  for (auto _ : state) {
+    o.sequence = ++sequence;
+    o.T_map_sensor.yaw_rad = 0.1 * sequence;
+    grid.add(o);
+    grid.remove(o, {6.0f});
+    grid.remove(o, {0.0f, 6.0f});
+  }
+}
+BENCHMARK(integrate_and_remove_in_two_parts)->Arg(3)->Arg(10)->Arg(18)->Unit(benchmark::kMicrosecond)->Apply(shortest);
+
 void align(benchmark::State& state) {
   const TsdfGrid grid = hall(8.0);
   const auto count = static_cast<std::size_t>(state.range(0));

@@ -73,6 +73,30 @@ TEST(HalfSeen, SomebodyWhoWasSeenWholeAndSteppedUpIsHalfSeenThere) {
   EXPECT_EQ(room.at(2.92, 2.1), CellState::kOccupied) << "0.8 m ahead of the robot that drove up meanwhile";
 }
 
+TEST(HalfSeen, WhatWasSeenWholeKeepsItsOutlineWhileTheCameraLooksPastItFromNearUntilItIsSeenFromAfarOrGone) {
+  // A body 0.5 m wide seen from 1.8 m; from 0.8 m its legs only, 0.3 m wide.
+  const double body_y0 = 1.9, body_y1 = 2.4;
+  Room room;
+  room.see({1.2, 2.15, 0.0}, kX0, body_y0, kX1, body_y1);
+  room.see({2.2, 2.15, 0.0}, kX0, 2.0, kX1, kY1);
+  EXPECT_EQ(room.at(3.1, 1.92), CellState::kOccupied);
+  EXPECT_EQ(room.at(3.1, 2.37), CellState::kOccupied);
+  EXPECT_EQ(room.at(3.1, 1.87), CellState::kFree) << "as wide as it was, no wider";
+  room.see({3.1, 2.8, -1.57}, kX0, 2.0, kX1, kY1);  // from another side, near
+  EXPECT_EQ(room.at(3.1, 2.37), CellState::kOccupied);
+  room.see({1.2, 2.15, 0.0}, kX0, 2.0, kX1, kY1);  // from afar it has shrunk: a box was taken away that stood beside it
+  EXPECT_EQ(room.at(3.1, 2.37), CellState::kFree);
+  room.see({2.2, 2.15, 0.0}, kX0, 2.0, kX1, kY1);
+  EXPECT_EQ(room.at(3.1, 2.37), CellState::kFree);
+  // Gone altogether, its outline goes as well.
+  Room other;
+  other.see({1.2, 2.15, 0.0}, kX0, body_y0, kX1, body_y1);
+  other.see({2.2, 2.15, 0.0}, 1.0, 1.0, 1.0, 1.0);
+  EXPECT_EQ(other.at(3.1, 1.92), CellState::kFree);
+  other.see({2.2, 2.15, 0.0}, kX0, 2.0, kX1, kY1);  // and who comes there then is half seen
+  EXPECT_EQ(other.at(2.92, 2.15), CellState::kOccupied);
+}
+
 TEST(HalfSeen, WallsOfTheMapThatLieAFewCellsOffAndWideThingsAreAsTheyAre) {
   Room room;
   room.see({1.0, 3.2, 1.57}, 0.5, 3.85, 3.0, 3.95);  // beside the room's upper wall

@@ -59,8 +59,8 @@ double let_differ_rad(const OdometryBoundConfig& config, int windows) {
 }
 
 TEST(OdometryBound, OdometryThatWasFoundGoodIsWorthMoreThanTheMotionModelSays) {
-  // Each window is off by 0.004 of 0.4 rad, 0.1 of the model's deviations: 4 x 0.1 instead of 2 of them, half of that at half the coverage.
-  EXPECT_NEAR(let_differ_rad({}, 12), 0.5 * 0.4 * 0.04 + 0.0035, 1e-6);
+  // Each window is off by 0.004 of 0.4 rad, 0.1 of the model's deviations: 6 x 0.1 instead of 2 of them, half of that at half the coverage.
+  EXPECT_NEAR(let_differ_rad({}, 12), 0.5 * 0.6 * 0.04 + 0.0035, 1e-6);
   EXPECT_NEAR(let_differ_rad({}, 8), 0.04 + 0.0035, 1e-6) << "too few windows to know";
   OdometryBoundConfig off;
   off.learned_sds = 0.0;
