@@ -28,7 +28,7 @@ class CombinedMap {
   /// @param memory_s  how long what the local map showed occupied stays so once it is off its edge. Without it a way closed
   /// at the edge is closed and open by turns as the robot turns away from it and back.
   /// @param surface_cells  see MapLayer
-  /// @param half_seen  what becomes of things that came up close to the robot; by default nothing
+  /// @param half_seen  where somebody may be of whom less is seen; by default nowhere
   CombinedMap(double reach_m, int occupied_threshold, int free_threshold, double memory_s = 0.0, double surface_cells = 0.0,
               HalfSeen half_seen = {0.0, 0.0, 0.0});
 

@@ -139,7 +139,7 @@ void HalfSeen::occupy(int cx, int cy, double radius_m, const CellWindow& window,
     const std::size_t i = at(window, x, y);
     const bool robots = std::hypot(geometry_.center_x_m(x) - robot.x_m, geometry_.center_y_m(y) - robot.y_m) < keep_off_m_;
     if (robots || std::hypot(x - cx, y - cy) > r || (*local)[i] == CellState::kOccupied) return false;
-    (*local)[i] = CellState::kOccupied;
+    (*local)[i] = CellState::kSupposed;
     (*surface)[i] = {};
     return false;
   });

@@ -16,15 +16,15 @@ namespace knav {
 class HalfSeen {
  public:
   /// @param wider_m  by so much; 0 = off  @param within_m  what is seen from farther away is seen whole
-  /// @param keep_off_m  so near to the robot's middle, which is there, no cell becomes occupied
+  /// @param keep_off_m  so near to the robot's middle, which is there, no cell becomes supposed
   HalfSeen(double wider_m, double within_m, double keep_off_m) : wider_m_(wider_m), within_m_(within_m), keep_off_m_(keep_off_m) {}
 
   void reset(const GridGeometry& geometry);
   /// Call with every new local map, before it is laid over the global one.
-  /// @param window  of the cells in `local` and `surface`, row-major; cells round what is half seen become occupied
+  /// @param window  of the cells in `local` and `surface`, row-major; cells round what is half seen become CellState::kSupposed
   void widen(const MapLayer& global, const CellWindow& window, const Pose2& T_map_robot, std::vector<CellState>* local,
              std::vector<SurfaceOffset>* surface);
-  /// The same where nothing was seen at all: round each of these points a disc of this radius becomes occupied.
+  /// The same where nothing was seen at all: round each of these points a disc of this radius becomes supposed.
   void put(const std::vector<Point2>& middles, double radius_m, const CellWindow& window, const Point2& robot, std::vector<CellState>* local,
            std::vector<SurfaceOffset>* surface) const;
 

@@ -12,7 +12,13 @@ namespace knav {
 
 constexpr double kBody_m = 0.25;  ///< radius of somebody
 
-enum class CellState : std::uint8_t { kUnknown = 0, kFree = 1, kOccupied = 2, kKeepout = 3 };
+enum class CellState : std::uint8_t {
+  kUnknown = 0,
+  kFree = 1,
+  kOccupied = 2,
+  kKeepout = 3,
+  kSupposed = 4,  ///< nothing was seen there, but somebody may be, see HalfSeen and Walkers: not driven on, and neither remembered nor taken for motion
+};
 
 /// One map with the clearance of each of its cells. Only free cells are open; unknown is never free.
 struct MapLayer {

@@ -62,7 +62,8 @@ void MovingCells::update(const MapLayer& global, const MapLayer& combined, const
   for (int iy = window.y0; iy < window.y1; ++iy) {
     for (int ix = window.x0; ix < window.x1; ++ix) {
       const std::size_t i = geometry_.index(ix, iy);
-      if (combined.state[i] == CellState::kFree && is_trail(global, combined, ix, iy, now)) trail_.push_back({geometry_.center_x_m(ix), geometry_.center_y_m(iy)});
+      const bool left = combined.state[i] == CellState::kFree || combined.state[i] == CellState::kSupposed;
+      if (left && is_trail(global, combined, ix, iy, now)) trail_.push_back({geometry_.center_x_m(ix), geometry_.center_y_m(iy)});
       if (combined.state[i] != CellState::kOccupied) continue;
       if (now - occupied_to_s_[i] > static_cast<float>(kStillThere_s)) occupied_from_s_[i] = now;
       occupied_to_s_[i] = now;

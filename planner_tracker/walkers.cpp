@@ -75,7 +75,7 @@ void Walkers::update(const std::vector<Point2>& moving, const MapLayer& layer, c
     track.seen_s = now_s;
     clusters_.erase(nearest);
     const int ix = layer.geometry.cell_x(track.began_at.x_m), iy = layer.geometry.cell_y(track.began_at.y_m);
-    track.walks = track.walks || (away_m(track.at, track.began_at) > kWalked_m && layer.at(ix, iy) == CellState::kFree);
+    track.walks = track.walks || (away_m(track.at, track.began_at) > kWalked_m && layer.at(ix, iy) != CellState::kOccupied);
   }
   const auto gone = [&](const Track& track) {
     const double unseen_s = now_s - track.seen_s;

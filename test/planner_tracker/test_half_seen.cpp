@@ -35,10 +35,10 @@ constexpr double kX0 = 3.0, kY0 = 2.0, kX1 = 3.3, kY1 = 2.3;
 TEST(HalfSeen, WhatCameUpBesideTheRobotIsTenCentimetresWiderAllRound) {
   Room room;
   room.see({2.2, 2.1, 0.0}, kX0, kY0, kX1, kY1);  // 0.8 m ahead, never seen before
-  EXPECT_EQ(room.at(2.97, 2.1), CellState::kOccupied);
-  EXPECT_EQ(room.at(2.92, 2.1), CellState::kOccupied);
+  EXPECT_EQ(room.at(2.97, 2.1), CellState::kSupposed);
+  EXPECT_EQ(room.at(2.92, 2.1), CellState::kSupposed);
   EXPECT_EQ(room.at(2.87, 2.1), CellState::kFree);
-  EXPECT_EQ(room.at(3.15, 2.38), CellState::kOccupied);
+  EXPECT_EQ(room.at(3.15, 2.38), CellState::kSupposed);
   EXPECT_EQ(room.at(3.15, 2.43), CellState::kFree);
   EXPECT_EQ(room.at(2.92, 1.92), CellState::kFree) << "round corners: 0.14 m off";
 }
@@ -57,7 +57,7 @@ TEST(HalfSeen, WhatWasInViewFromFartherAwayIsAsWideAsItIsSeenAndStaysSoWhenTheRo
 TEST(HalfSeen, FromFartherAwayButNotInViewNothingWasSeenOfIt) {
   Room room;
   room.see({1.0, 2.1, 1.5}, kX0, kY0, kX1, kY1);  // 2 m away, to the right of the robot
-  EXPECT_EQ(room.at(2.92, 2.1), CellState::kOccupied);
+  EXPECT_EQ(room.at(2.92, 2.1), CellState::kSupposed);
   room.see({1.0, 2.1, 0.1}, kX0, kY0, kX1, kY1);  // it has turned to it
   EXPECT_EQ(room.at(2.92, 2.1), CellState::kFree);
 }
@@ -67,10 +67,10 @@ TEST(HalfSeen, SomebodyWhoWasSeenWholeAndSteppedUpIsHalfSeenThere) {
   room.see({1.0, 2.1, 0.0}, kX0, kY0, kX1, kY1);
   EXPECT_EQ(room.at(2.92, 2.1), CellState::kFree);
   room.see({1.0, 2.1, 0.0}, 1.7, kY0, 2.0, kY1);  // 0.7 m ahead now
-  EXPECT_EQ(room.at(1.62, 2.1), CellState::kOccupied);
+  EXPECT_EQ(room.at(1.62, 2.1), CellState::kSupposed);
   // And back where he was, which the camera saw empty meanwhile: in view again from 2 m.
   room.see({2.2, 2.1, 0.0}, kX0, kY0, kX1, kY1);
-  EXPECT_EQ(room.at(2.92, 2.1), CellState::kOccupied) << "0.8 m ahead of the robot that drove up meanwhile";
+  EXPECT_EQ(room.at(2.92, 2.1), CellState::kSupposed) << "0.8 m ahead of the robot that drove up meanwhile";
 }
 
 TEST(HalfSeen, WhatWasSeenWholeKeepsItsOutlineWhileTheCameraLooksPastItFromNearUntilItIsSeenFromAfarOrGone) {
@@ -79,11 +79,11 @@ TEST(HalfSeen, WhatWasSeenWholeKeepsItsOutlineWhileTheCameraLooksPastItFromNearU
   Room room;
   room.see({1.2, 2.15, 0.0}, kX0, body_y0, kX1, body_y1);
   room.see({2.2, 2.15, 0.0}, kX0, 2.0, kX1, kY1);
-  EXPECT_EQ(room.at(3.1, 1.92), CellState::kOccupied);
-  EXPECT_EQ(room.at(3.1, 2.37), CellState::kOccupied);
+  EXPECT_EQ(room.at(3.1, 1.92), CellState::kSupposed);
+  EXPECT_EQ(room.at(3.1, 2.37), CellState::kSupposed);
   EXPECT_EQ(room.at(3.1, 1.87), CellState::kFree) << "as wide as it was, no wider";
   room.see({3.1, 2.8, -1.57}, kX0, 2.0, kX1, kY1);  // from another side, near
-  EXPECT_EQ(room.at(3.1, 2.37), CellState::kOccupied);
+  EXPECT_EQ(room.at(3.1, 2.37), CellState::kSupposed);
   room.see({1.2, 2.15, 0.0}, kX0, 2.0, kX1, kY1);  // from afar it has shrunk: a box was taken away that stood beside it
   EXPECT_EQ(room.at(3.1, 2.37), CellState::kFree);
   room.see({2.2, 2.15, 0.0}, kX0, 2.0, kX1, kY1);
@@ -94,7 +94,7 @@ TEST(HalfSeen, WhatWasSeenWholeKeepsItsOutlineWhileTheCameraLooksPastItFromNearU
   other.see({2.2, 2.15, 0.0}, 1.0, 1.0, 1.0, 1.0);
   EXPECT_EQ(other.at(3.1, 1.92), CellState::kFree);
   other.see({2.2, 2.15, 0.0}, kX0, 2.0, kX1, kY1);  // and who comes there then is half seen
-  EXPECT_EQ(other.at(2.92, 2.15), CellState::kOccupied);
+  EXPECT_EQ(other.at(2.92, 2.15), CellState::kSupposed);
 }
 
 TEST(HalfSeen, WallsOfTheMapThatLieAFewCellsOffAndWideThingsAreAsTheyAre) {

@@ -102,7 +102,7 @@ TEST_F(WatchedRoom, WhoWalkedOutOfViewMayHaveStoppedOnTheNextBitOfHisWayUntilTha
   const Point2 ahead{places[2].x_m, places[2].y_m + 0.15};
   EXPECT_EQ(state(ahead), CellState::kFree);
   map_.set_local(last, {}, now_s_ += 0.2, robot_, places);
-  EXPECT_EQ(state(ahead), CellState::kOccupied);
+  EXPECT_EQ(state(ahead), CellState::kSupposed);
   robot_.yaw_rad = 0.4;  // looks there again: what is there is in the local map
   see(last);
   EXPECT_TRUE(walkers_.may_stand_at().empty());
