@@ -133,6 +133,7 @@ void GlobalSearch::check(const MapFields& fields, Hypothesis* hypothesis) const 
   const bool no_place = !hypothesis->tracked && !(fields.map.nearest(T.x_m, T.y_m) > 0.0f);  // inside a wall
   hypothesis->cost = no_place ? 1.0 : check.cost;
   hypothesis->support = check.support;
+  hypothesis->explained = check.explained;
 }
 
 std::size_t GlobalSearch::refine(const MapFields& fields, Hypothesis* hypothesis) {

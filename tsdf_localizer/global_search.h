@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "core/particle_filter.h"
@@ -16,6 +17,7 @@ struct Hypothesis {
   double cost = 1.0;     ///< PoseCheck::cost after refinement
   double support = 0.0;  ///< PoseCheck::support
   bool tracked = false;  ///< more than this scan speaks for it: it may lie where the map has something
+  std::uint32_t explained = 0;  ///< PoseCheck::explained
 };
 
 /// Matches one scan against the whole map: all free places x all headings on a coarse field; the best of each
