@@ -4,15 +4,15 @@
 
 namespace knav {
 
-/// Which observations the map holds. The paper (section III.E) has 120 s and 20 m: enough to align frames with. Four times that and
-/// a robot that comes back within 80 m finds its own map again, and its estimate with it (docs/local_mapper.md).
+/// Which observations the map holds (paper section III.E: 120 s, 20 m). With four times that a robot that comes back within 80 m
+/// finds its own map again, and its estimate with it, but one that is carried away holds on to where it was (docs/local_mapper.md).
 struct WindowConfig {
-  double duration_s = 300.0;
-  double distance_m = 80.0;
+  double duration_s = 120.0;
+  double distance_m = 20.0;
   double far_m = 6.0;
   double far_distance_m = 20.0;
   std::string clock = "moving";
-  int max_observations = 6000;
+  int max_observations = 3600;
   int parked_observations = 60;
 
   template <class Visitor>
