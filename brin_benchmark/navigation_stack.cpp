@@ -109,6 +109,7 @@ void NavigationStack::localize(const Pose2& T_base_sensor, const Pose2& T_local_
                                const Pose2& T_odom_base, StageTimer* timer) {
   const LocalizerResult& pose = localizer_.update(scan_, T_base_sensor, T_local_base, epoch, &T_odom_base);
   timer->done(Stage::kLocalizer);
+  mapper_.set_in_doubt(pose.verdict != LocalizationVerdict::kOk);
   planner_.set_scan(scan_, T_base_sensor);
   if (!pose.has_pose) return;
   localized_ = true;

@@ -122,13 +122,28 @@ RecoveryScore measure_starts(const ScanRecording& starts, const MapInWorld& map,
   return score;
 }
 
+KidnappedLocalizer::KidnappedLocalizer(const MapInWorld& map, const LocalizerConfig& config) : map_(map), localizer_(config) {
+  localizer_.set_map(map.map);
+}
+
+Moment KidnappedLocalizer::ask(const ScanRecording& drive, std::size_t i) {
+  const auto place = [&] { localizer_.initialize(map_.T_world_map.inverse() * drive.frames[i].T_world_base, placing_covariance()); };
+  if (i == 0) place();
+  const std::size_t begin = *std::prev(std::upper_bound(drive.begins.begin(), drive.begins.end(), i));
+  if (i == begin) helped_ = false;
+  const double since_s = drive.frames[i].stamp_s - drive.frames[begin].stamp_s;
+  if (since_s > kKidnapLimit_s && !helped_ && !(last_.ok() && is_right(last_))) {
+    place();  // the next trial is to begin from a robot that knows where it is
+    helped_ = true;
+  }
+  last_ = knav::ask(localizer_, drive, i, map_, &scan_);
+  return last_;
+}
+
 RecoveryScore measure_kidnaps(const ScanRecording& drive, const MapInWorld& map, const LocalizerConfig& config,
                               std::vector<Moment>* moments) {
   RecoveryScore score;
-  Localizer localizer(config);
-  localizer.set_map(map.map);
-  localizer.initialize(map.T_world_map.inverse() * drive.frames.front().T_world_base, placing_covariance());
-  RangeScan scan;
+  KidnappedLocalizer localizer(map, config);
   bool was_right = true;
   for (std::size_t k = 0; k < drive.begins.size(); ++k) {
     const std::size_t begin = drive.begins[k], end = end_of(drive, k);
@@ -136,16 +151,10 @@ RecoveryScore measure_kidnaps(const ScanRecording& drive, const MapInWorld& map,
     const std::uint32_t epoch_before = begin > 0 ? drive.frames[begin - 1].epoch : 0;
     KidnapWatch watch(drive.frames[begin].stamp_s);
     double epoch_s = -1.0;
-    bool helped = false;
     Moment m;
     for (std::size_t i = begin; i < end; ++i) {
       const double since_s = drive.frames[i].stamp_s - drive.frames[begin].stamp_s;
-      if (since_s > kKidnapLimit_s && !helped && !(m.ok() && is_right(m))) {
-        // The next trial is to begin from a robot that knows where it is.
-        localizer.initialize(map.T_world_map.inverse() * drive.frames[i].T_world_base, placing_covariance());
-        helped = true;
-      }
-      m = ask(localizer, drive, i, map, &scan);
+      m = localizer.ask(drive, i);
       if (moments) moments->push_back(m);
       if (since_s <= kKidnapLimit_s && k > 0) {
         watch.add(m);

@@ -34,6 +34,22 @@ struct MapInWorld {
   Pose2 T_world_map;
 };
 
+/// The localizer of a robot that is told where it starts and then carried elsewhere at the beginning of each further stretch. If it has not found
+/// itself when the time for that is over, it is told.
+class KidnappedLocalizer {
+ public:
+  KidnappedLocalizer(const MapInWorld& map, const LocalizerConfig& config);
+  /// @param i frame of the recording, in order; the recording may still be growing
+  Moment ask(const ScanRecording& drive, std::size_t i);
+
+ private:
+  MapInWorld map_;
+  Localizer localizer_;
+  RangeScan scan_;
+  Moment last_;
+  bool helped_ = false;
+};
+
 /// A drive whose start somebody has given.
 TrackingScore measure_tracking(const ScanRecording& drive, const MapInWorld& map, const LocalizerConfig& config,
                                std::vector<Moment>* moments = nullptr);

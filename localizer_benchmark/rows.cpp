@@ -13,6 +13,7 @@
 #include "global_map_builder/map_directory.h"
 #include "kinect_sim/tour_recorder.h"
 #include "brin_benchmark/truth_map.h"
+#include "tsdf_localizer/localizer_node_config.h"
 
 namespace fs = std::filesystem;
 
@@ -83,7 +84,7 @@ LocalizerRows::LocalizerRows(const LocalizerBenchmarkOptions& options, const std
       sources_(sources),
       recordings_(options.cache, options.fresh),
       mapper_config_(read_config_section<LocalMapperConfig>(options.config, "local_mapper")),
-      localizer_config_(read_config_section<LocalizerConfig>(options.config, "localizer")) {
+      localizer_config_(read_config_section<LocalizerNodeConfig>(options.config, "localizer").localizer) {
   mapper_config_.seed = localizer_config_.seed = options.seed;
   for (const BuildingSource& source : sources) buildings_.push_back(prepare_building(source, options.cache + "/worlds", options.seed));
 }
@@ -192,16 +193,19 @@ ScanRecording LocalizerRows::start_scans(std::size_t building, bool unique, nloh
   return scans(d, unique ? starts.unique : starts.ambiguous, Link::kAnew, buildings_[building].name + (unique ? "-starts" : "-ambiguous"));
 }
 
-ScanRecording LocalizerRows::kidnap_scans(std::size_t building) {
+/// Made anew each time: a kidnapped robot's mapper goes by what the localizer says.
+ScanRecording LocalizerRows::kidnap_scans(std::size_t building, const MapInWorld& map) {
   const Drives d = drives(building, false, "calibrated", kDrive_m, true);
-  return scans(d, lay_out_kidnaps(d.profiles, share(options_.kidnaps), options_.seed), Link::kKidnapped, buildings_[building].name + "-kidnaps");
+  KidnappedLocalizer localizer(map, localizer_config_);
+  return record_scans(d.profiles, lay_out_kidnaps(d.profiles, share(options_.kidnaps), options_.seed), Link::kKidnapped, mapper_config_,
+                      [&](const ScanRecording& recording, std::size_t i) { return !localizer.ask(recording, i).ok(); });
 }
 
 void LocalizerRows::record(const std::string& row, std::size_t building) {
   if (row == "starts" || row == "ambiguous") {
     start_scans(building, row == "starts", nullptr);
   } else if (row == "kidnaps") {
-    kidnap_scans(building);
+    drives(building, false, "calibrated", kDrive_m, true);
   } else {
     tracking_scans(row, building);
   }
@@ -217,7 +221,7 @@ nlohmann::json LocalizerRows::measure(const std::string& row, std::size_t buildi
   }
   if (row == "kidnaps") {
     std::vector<Moment> moments;
-    json.update(recovery_json(measure_kidnaps(kidnap_scans(building), map, localizer_config_, &moments)));
+    json.update(recovery_json(measure_kidnaps(kidnap_scans(building, map), map, localizer_config_, &moments)));
     if (!trace.empty()) write_trace(fmt::format("{}/{}-kidnaps.tsv", trace, buildings_[building].name), moments);
     return json;
   }

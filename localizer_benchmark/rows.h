@@ -47,7 +47,7 @@ class LocalizerRows {
   MapInWorld map_of(std::size_t building);
   std::vector<ScanRecording> tracking_scans(const std::string& row, std::size_t building);
   ScanRecording start_scans(std::size_t building, bool unique, nlohmann::json* json);
-  ScanRecording kidnap_scans(std::size_t building);
+  ScanRecording kidnap_scans(std::size_t building, const MapInWorld& map);
   std::size_t share(int trials) const;
 
   LocalizerBenchmarkOptions options_;

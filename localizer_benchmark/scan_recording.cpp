@@ -114,7 +114,7 @@ ScanRecording ScanRecording::load(const std::string& path) {
 }
 
 ScanRecording record_scans(const std::vector<ProfileRecording>& drives, const std::vector<Stretch>& stretches, Link link,
-                           const LocalMapperConfig& config) {
+                           const LocalMapperConfig& config, const InDoubt& in_doubt) {
   ScanRecording recording;
   LocalMapper mapper(config);
   DepthProfile profile;
@@ -151,6 +151,7 @@ ScanRecording record_scans(const std::vector<ProfileRecording>& drives, const st
       if (!result.accepted) continue;
       mapper.extract_scan_360(&scan);
       recording.add({result.stamp_s, result.T_local_base, result.T_odom_base, T_world_base, result.epoch}, scan);
+      if (in_doubt) mapper.set_in_doubt(in_doubt(recording, recording.frames.size() - 1));
       if (done % 30 == 0) {
         stop_if_interrupted();
         progress.update(static_cast<double>(done) / static_cast<double>(all));

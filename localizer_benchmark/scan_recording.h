@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,8 @@
 
 namespace knav {
 
-/// What the localizer is given in a drive, with the truth beside it. Made once by the local mapper, as it does not depend on
-/// the localizer, which can then be measured again and again in a fraction of the time.
+/// What the localizer is given in a drive, with the truth beside it. Made once by the local mapper, which hears nothing of the
+/// localizer but its doubt; where that matters little it can then be measured again and again in a fraction of the time.
 struct ScanRecording {
   struct Frame {
     double stamp_s = 0.0;
@@ -49,9 +50,13 @@ enum class Link {
   kKidnapped  ///< the robot is carried from one stretch to the next while everything runs and the wheels stand
 };
 
+/// Whether the localizer is in doubt after the newest frame of the recording.
+using InDoubt = std::function<bool(const ScanRecording&, std::size_t frame)>;
+
 /// The local mapper along stretches of drives.
+/// @param in_doubt what the mapper is told after each frame; empty: no doubt
 ScanRecording record_scans(const std::vector<ProfileRecording>& drives, const std::vector<Stretch>& stretches, Link link,
-                           const LocalMapperConfig& config);
+                           const LocalMapperConfig& config, const InDoubt& in_doubt = {});
 /// The whole of one drive without the local mapper: the 57-degree scan of each frame, and odometry.
 ScanRecording record_plain_scans(const ProfileRecording& drive);
 

@@ -126,6 +126,7 @@ struct LocalMapper::State {
   bool have_frame = false;  ///< stamp_s, T_odom_base and T_local_base of `result` mean something
   bool have_map = false;
   bool newest_integrated = false;
+  bool in_doubt = false;  ///< the localizer is
   bool any_epoch = false;
   double clock_s = 0.0;  ///< the window's clock
   double travelled_m = 0.0;
@@ -228,7 +229,7 @@ void LocalMapper::State::observe(const Frame& frame) {
 void LocalMapper::State::integrate(const Pose2& T_base_sensor) {
   window.scratch().T_map_sensor = result.T_local_base * T_base_sensor;
   grid.scroll_to(result.T_local_base.x_m, result.T_local_base.y_m, window.next_sequence());
-  window.expire(&grid, clock_s, travelled_m);
+  window.expire(&grid, clock_s, travelled_m, in_doubt);
   window.push(&grid, clock_s, travelled_m, parked && config.window.clock == "moving");
   if (range_errors.on()) range_errors.learn(window, travelled_m, grid, config.contour);
 }
@@ -375,6 +376,8 @@ const LocalMapperResult& LocalMapper::update(const RangeScan& scan, const Pose2&
       !scan.range_m.empty() && std::isfinite(scan.angle_min_rad) && turn > 0.0 && turn < 6.5;
   return state_->update(scan, sensible, T_base_sensor);
 }
+
+void LocalMapper::set_in_doubt(bool in_doubt) { state_->in_doubt = in_doubt; }
 
 void LocalMapper::extract_scan_360(RangeScan* scan) const {
   const State& s = *state_;

@@ -72,6 +72,10 @@ class LocalMapper {
   const LocalMapperResult& update(const DepthProfile& profile, const Pose2& T_base_camera);
   const LocalMapperResult& update(const RangeScan& scan, const Pose2& T_base_sensor);
 
+  /// Whether the localizer, if there is one, knows where the robot is; while not, the map remembers less
+  /// (WindowConfig::doubtful_distance_m).
+  void set_in_doubt(bool in_doubt);
+
   /// The virtual 360-degree scan from the newest pose, in the robot's frame (section III.F, III.H).
   void extract_scan_360(RangeScan* scan) const;
   /// A square of the map round the robot, in the local map's frame: 0 free, 100 surface, -1 unknown.

@@ -16,7 +16,7 @@ namespace knav {
 
 /// The particle filter over the robot's pose (paper section III.E).
 struct FilterConfig {
-  int particles = 1000;
+  int particles = 2000;
   int readings = 120;
   std::string alignment_cost = "normalized";
   double temperature = 0.0003;

@@ -3,6 +3,7 @@
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <kinect_nav/DepthProfile.h>
+#include <kinect_nav/LocalizationStatus.h>
 #include <nav_msgs/Odometry.h>
 #include <ros/ros.h>
 #include <sensor_msgs/LaserScan.h>
@@ -64,6 +65,7 @@ class LocalMapperNodelet : public NodeletBase {
     profile_ = node.subscribe("depth_profile", 5, &LocalMapperNodelet::on_profile, this);
     scan_ = node.subscribe("scan_in", 5, &LocalMapperNodelet::on_scan, this);
     initial_pose_ = node.subscribe("initialpose", 2, &LocalMapperNodelet::on_initial_pose, this);
+    localization_ = node.subscribe("localization_status", 2, &LocalMapperNodelet::on_localization, this);
     timer_ = node.createWallTimer(ros::WallDuration(1.0), &LocalMapperNodelet::on_timer, this);
   }
 
@@ -94,6 +96,10 @@ class LocalMapperNodelet : public NodeletBase {
     pending_.clear();
     mapper_->reset();
     NODELET_INFO("A pose was given on %s: the local map begins anew.", initial_pose_.getTopic().c_str());
+  }
+
+  void on_localization(const kinect_nav::LocalizationStatusConstPtr& message) {
+    mapper_->set_in_doubt(message->status != kinect_nav::LocalizationStatus::OK);
   }
 
   void enqueue(Pending frame) {
@@ -221,7 +227,7 @@ class LocalMapperNodelet : public NodeletBase {
   tf2_ros::Buffer tf_;
   std::unique_ptr<tf2_ros::TransformListener> listener_;
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
-  ros::Subscriber odom_, profile_, scan_, initial_pose_;
+  ros::Subscriber odom_, profile_, scan_, initial_pose_, localization_;
   ros::WallTimer timer_;
   std::deque<Pending> pending_;
   DepthProfile profile_buffer_;

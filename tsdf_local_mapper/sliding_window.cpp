@@ -3,6 +3,12 @@
 #include <algorithm>
 
 namespace knav {
+namespace {
+
+/// Observations a frame: a minute's leave within two seconds, and no frame takes much longer for it.
+constexpr int kForgottenInDoubt = 40;
+
+}  // namespace
 
 TsdfObservation& SlidingWindow::scratch() {
   if (free_.empty()) {
@@ -34,12 +40,17 @@ void SlidingWindow::push(TsdfGrid* grid, double clock_s, double travelled_m, boo
   order_.push_back(index);
 }
 
-void SlidingWindow::expire(TsdfGrid* grid, double clock_s, double travelled_m) {
+void SlidingWindow::expire(TsdfGrid* grid, double clock_s, double travelled_m, bool doubtful) {
+  int in_doubt = 0;
   while (!order_.empty()) {
     const Slot& oldest = *slots_[order_.front()];
+    const double driven_m = travelled_m - oldest.travelled_m;
     const bool old = clock_s - oldest.clock_s > config_.duration_s;
-    const bool far = travelled_m - oldest.travelled_m > config_.distance_m;
-    if (!old && !far) break;
+    const bool far = driven_m > config_.distance_m;
+    if (!old && !far) {
+      if (!doubtful || driven_m <= config_.doubtful_distance_m || in_doubt >= kForgottenInDoubt) break;
+      ++in_doubt;
+    }
     remove(grid, 0);
   }
   expire_far_parts(grid, travelled_m);

@@ -20,8 +20,9 @@ class SlidingWindow {
   /// Adds the scratch observation to the grid. Its pose and sensor model must be set; sequence and clock are
   /// set here. While `parked`, only the newest few frames of the place are held.
   void push(TsdfGrid* grid, double clock_s, double travelled_m, bool parked);
-  /// Takes out what is too old or too far back.
-  void expire(TsdfGrid* grid, double clock_s, double travelled_m);
+  /// Takes out what is too old or too far back; a few dozen observations a call of what only doubt makes so.
+  /// @param doubtful the localizer does not know where the robot is
+  void expire(TsdfGrid* grid, double clock_s, double travelled_m, bool doubtful);
   /// Forgets the queue; the caller clears the grid. Sequences go on.
   void clear();
 

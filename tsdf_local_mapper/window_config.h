@@ -5,20 +5,25 @@
 namespace knav {
 
 /// Which observations the map holds (paper section III.E: 120 s, 20 m). With four times that a robot that comes back within 80 m
-/// finds its own map again, and its estimate with it, but one that is carried away holds on to where it was (docs/local_mapper.md).
+/// finds its own map again, and its estimate with it; but one that is carried away holds on to where it was, so that it
+/// remembers less while the localizer is in doubt (docs/local_mapper.md).
 struct WindowConfig {
-  double duration_s = 120.0;
-  double distance_m = 20.0;
+  double duration_s = 300.0;
+  double distance_m = 80.0;
+  double doubtful_distance_m = 8.0;
   double far_m = 6.0;
   double far_distance_m = 20.0;
   std::string clock = "moving";
-  int max_observations = 3600;
+  int max_observations = 6000;
   int parked_observations = 60;
 
   template <class Visitor>
   void visit(Visitor& v) {
     v.number("duration_s", duration_s, 1, 3600, "s", "An observation leaves the map after this long.");
     v.number("distance_m", distance_m, 1, 200, "m", "An observation leaves after the robot drove this far.");
+    v.number("doubtful_distance_m", doubtful_distance_m, 1, 200, "m",
+             "The same while the localizer does not know where the robot is (localization_status): it may have been carried, and holds on to where it was "
+             "for as long as that is remembered.");
     v.number("far_m", far_m, 0, 100, "m",
              "DepthProfile: what a frame says of places farther from the camera than this leaves sooner, as a depth camera errs with the range squared; 0 = no "
              "sooner than the rest.");

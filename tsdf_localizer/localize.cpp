@@ -90,6 +90,7 @@ class Follower {
     const LocalizerResult& r = localizer.update(scan, T_base_sensor, T_local_base, epoch, &T_odom_base);
     const double ms =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+    mapper_.set_in_doubt(r.verdict != LocalizationVerdict::kOk);
     if (!r.accepted) return;
     if (scans_ == 0) first_s_ = r.stamp_s;
     ++scans_;

@@ -1,10 +1,11 @@
-// The local mapper in the graph: every output, frames waiting for odometry, a LaserScan instead of profiles,
-// a clock that jumps back, and no stamp sent twice.
+// The local mapper in the graph: every output, frames waiting for odometry, a LaserScan instead of profiles, the
+// localizer's doubt, a clock that jumps back, and no stamp sent twice.
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <gtest/gtest.h>
 #include <kinect_nav/DepthProfile.h>
+#include <kinect_nav/LocalizationStatus.h>
 #include <kinect_nav/MotionEstimate.h>
 #include <nav_msgs/OccupancyGrid.h>
 #include <nav_msgs/Odometry.h>
@@ -17,6 +18,7 @@
 #include <cmath>
 #include <functional>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "ros_common/conversions.h"
@@ -32,6 +34,7 @@ class LocalMapperGraph : public ::testing::Test {
     profile_ = node_.advertise<kinect_nav::DepthProfile>("depth_profile", 10);
     initial_pose_ = node_.advertise<geometry_msgs::PoseWithCovarianceStamped>("initialpose", 1);
     laser_ = node_.advertise<sensor_msgs::LaserScan>("scan_in", 10);
+    localization_ = node_.advertise<kinect_nav::LocalizationStatus>("localization_status", 1, true);
     const auto keep = [this](auto& list, const auto& message) { list.push_back(*message); };
     subscribers_ = {
         node_.subscribe<kinect_nav::MotionEstimate>("motion_estimate", 100,
@@ -86,6 +89,22 @@ class LocalMapperGraph : public ::testing::Test {
     message.header.frame_id = "camera_depth_optical_frame";
     profile_.publish(message);
   }
+  /// How many the map holds, from the next report; -1 if none comes.
+  int observations() {
+    reports.clear();
+    int count = -1;
+    wait([&] {
+      for (const auto& report : reports) {
+        for (const auto& status : report.status) {
+          for (const auto& value : status.values) {
+            if (value.key == "observations in the map") count = std::stoi(value.value);
+          }
+        }
+      }
+      return count >= 0;
+    });
+    return count;
+  }
   /// Drives frame by frame, each answered before the next is sent.
   void drive(int frames, double distance_m, double turn_rad) {
     for (int i = 0; i < frames; ++i) {
@@ -99,7 +118,7 @@ class LocalMapperGraph : public ::testing::Test {
   }
 
   ros::NodeHandle node_;
-  ros::Publisher odom_, profile_, laser_, initial_pose_;
+  ros::Publisher odom_, profile_, laser_, initial_pose_, localization_;
   std::vector<ros::Subscriber> subscribers_;
   tf2_ros::StaticTransformBroadcaster broadcaster_;
   RoomWorld world_ = RoomWorld::furnished();
@@ -183,6 +202,14 @@ TEST_F(LocalMapperGraph, EverythingItPublishes) {
   std::set<double> stamps;
   for (const auto& T : transforms)
     EXPECT_TRUE(stamps.insert(T.header.stamp.toSec()).second) << "a stamp sent twice";
+
+  // While the localizer is in doubt only the last metre is remembered (window/doubtful_distance_m here).
+  EXPECT_GT(observations(), 50);
+  kinect_nav::LocalizationStatus doubt;
+  doubt.status = kinect_nav::LocalizationStatus::UNCERTAIN;
+  localization_.publish(doubt);
+  drive(100, 0.04, 0.04);  // round in a metre
+  EXPECT_LT(observations(), 40);
 
   // The clock jumps back: a new epoch, and life goes on.
   const std::uint32_t epoch = motion.back().epoch;

@@ -39,7 +39,7 @@ class Window : public ::testing::Test {
       observation_from(profile_of(z_m, 100.0), limits_of(fixed_truncation(0.3)), &o);
     }
     o.T_map_sensor = {0.0, 0.0, 0.0};
-    window->expire(&grid_, travelled_m, travelled_m);
+    window->expire(&grid_, travelled_m, travelled_m, false);
     window->push(&grid_, travelled_m, travelled_m, false);
   }
   bool near_wall() const { return grid_.known(grid_.cell_of(3.0), grid_.cell_of(-0.5)); }
@@ -54,15 +54,15 @@ TEST_F(Window, AProfilesFarPartLeavesFirstAndTheRestWithItsTime) {
   for (const double travelled_m : {0.0, 1.0, 2.0}) push(&window, travelled_m);
   EXPECT_TRUE(near_wall());
   EXPECT_TRUE(far_wall());
-  window.expire(&grid_, 11.5, 11.5);
+  window.expire(&grid_, 11.5, 11.5, false);
   EXPECT_TRUE(far_wall()) << "the third one's";
-  window.expire(&grid_, 12.5, 12.5);
+  window.expire(&grid_, 12.5, 12.5, false);
   EXPECT_FALSE(far_wall());
   EXPECT_TRUE(near_wall());
   EXPECT_EQ(window.size(), 3);
-  window.expire(&grid_, 41.5, 41.5);
+  window.expire(&grid_, 41.5, 41.5, false);
   EXPECT_TRUE(near_wall());
-  window.expire(&grid_, 42.5, 42.5);
+  window.expire(&grid_, 42.5, 42.5, false);
   EXPECT_FALSE(near_wall());
   EXPECT_EQ(window.size(), 0);
 }
@@ -72,19 +72,35 @@ TEST_F(Window, OneThatMakesRoomTakesWithItWhatIsLeftOfIt) {
   for (int i = 0; i < 20; ++i) push(&window, 3.0 * i);  // five are held, the last three with their far parts
   EXPECT_EQ(window.size(), 5);
   EXPECT_TRUE(far_wall());
-  window.expire(&grid_, 57.0 + 10.5, 57.0 + 10.5);
+  window.expire(&grid_, 57.0 + 10.5, 57.0 + 10.5, false);
   EXPECT_FALSE(far_wall());
   EXPECT_TRUE(near_wall());
-  window.expire(&grid_, 200.0, 200.0);
+  window.expire(&grid_, 200.0, 200.0, false);
   for (int ix = grid_.first_x(); ix < grid_.first_x() + grid_.size_cells(); ++ix) {
     for (int iy = grid_.first_y(); iy < grid_.first_y() + grid_.size_cells(); ++iy) ASSERT_EQ(grid_.weight_units(ix, iy), 0);
   }
 }
 
+TEST_F(Window, DoubtShortensTheMemoryByAFewDozenFramesAtATime) {
+  config_.max_observations = 1000;
+  config_.distance_m = 200.0;
+  config_.doubtful_distance_m = 1.0;
+  SlidingWindow window(config_);
+  for (int i = 0; i < 80; ++i) push(&window, 0.125 * i);  // of 9.875 m
+  window.expire(&grid_, 9.875, 9.875, false);
+  EXPECT_EQ(window.size(), 80);
+  window.expire(&grid_, 9.875, 9.875, true);
+  EXPECT_EQ(window.size(), 40);
+  window.expire(&grid_, 9.875, 9.875, false);
+  EXPECT_EQ(window.size(), 40) << "sure again: what is left stays";
+  for (int i = 0; i < 3; ++i) window.expire(&grid_, 9.875, 9.875, true);
+  EXPECT_EQ(window.size(), 9) << "a metre, both ends included";
+}
+
 TEST_F(Window, AScansFarPartStays) {
   SlidingWindow window(config_);
   push(&window, 0.0, true);
-  window.expire(&grid_, 20.0, 20.0);
+  window.expire(&grid_, 20.0, 20.0, false);
   EXPECT_TRUE(far_wall());
 }
 

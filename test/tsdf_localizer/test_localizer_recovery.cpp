@@ -277,6 +277,42 @@ TEST(LocalizerRecovery, ATrackedPoseIsNotLeftForAPlaceThatLooksBetterFromOneSpot
   EXPECT_GT(uncertain_s, 5.0) << "it should say that much is not explained";
 }
 
+TEST(LocalizerRecovery, ATrackedPoseIsNotLeftForAPlaceWhoseViewIsMostlyUnknownGround) {
+  // Cabinets of the left room's map are gone. Of the right room, its twin, the map has the floor and the far wall alone, which explains a part of
+  // the view without a fault; all else would lie on unknown ground there, which costs half of what a contradiction does.
+  const Building world = test::twin_rooms();
+  Building mapped = world;
+  mapped.wall(0.2, 3.2, 1.4, 7.4);
+  mapped.wall(1.0, 8.2, 3.8, 8.8);
+  mapped.wall(3.9, 3.2, 6.0, 5.9);
+  DistanceMap map = mapped.distance_map();
+  const GridGeometry& g = map.geometry;
+  for (int iy = 0; iy < g.height_cells; ++iy) {
+    for (int ix = 0; ix < g.width_cells; ++ix) {
+      float& d = map.distance_m[g.index(ix, iy)];
+      const bool right_room = g.center_x_m(ix) > 5.9 && g.center_y_m(iy) > 3.1;
+      if (right_room && !(g.center_y_m(iy) > 8.4 && g.center_x_m(ix) > 9.5) && d < 0.3f) d = NAN;
+    }
+  }
+  LocalizerConfig config;
+  config.health.ok_fraction = 0.9;
+  config.global_search.unseat_alone_support = 0.65;
+  Localizer localizer{config};
+  localizer.set_map(map);
+  ScanModel laser;
+  laser.rays = 720;
+  laser.noise_m = 0.02;
+  double t = 0.0, uncertain_s = 0.0;
+  const std::vector<Pose2> way = test::drive({{4.0, 2.0}, {3.0, 2.0}, {3.0, 7.5}, {2.0, 7.5}, {2.0, 4.0}}, kRate_hz);
+  localizer.initialize(way.front(), Eigen::Vector3d(0.04, 0.04, 0.01).asDiagonal());
+  for (const Pose2& pose : way) {
+    const LocalizerResult& r = localizer.update(make_scan(world, pose, laser, t += 1.0 / kRate_hz), Pose2(), pose, 1);
+    uncertain_s += r.verdict == V::kUncertain ? 1.0 / kRate_hz : 0.0;
+    ASSERT_LT(distance_m(r.T_map_base, pose), 0.5) << "after " << t << " s: " << r.reason;
+  }
+  EXPECT_GT(uncertain_s, 10.0) << "there should be reason for doubt";
+}
+
 TEST(LocalizerRecovery, AWrongInitialPoseIsNotedAndLeft) {
   const Building office = test::office();
   Localizer localizer{LocalizerConfig()};
