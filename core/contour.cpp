@@ -43,13 +43,12 @@ class QuadWalk {
     next_y_ += along_x ? 0 : delta_y_;
   }
 
-  /// As many steps as leave the block of 2^shift quads a side, unless that is farther than `limit`.
+  /// As many steps as leave the square, in which the walk is, unless that is farther than `limit`.
   /// @param left_at   where it was left
   /// @param last_ix, last_iy  the last quad before that
-  bool leave_block(int shift, Along limit, Along* left_at, int* last_ix, int* last_iy) {
-    const int inside = (1 << shift) - 1;
-    int x = step_x_ > 0 ? inside - (ix & inside) : ix & inside;  // edges to cross before the last one
-    int y = step_y_ > 0 ? inside - (iy & inside) : iy & inside;
+  bool leave(const FreeBlocks::Square& square, Along limit, Along* left_at, int* last_ix, int* last_iy) {
+    int x = step_x_ > 0 ? square.high_x - ix : ix - square.low_x;  // edges to cross before the last one
+    int y = step_y_ > 0 ? square.high_y - iy : iy - square.low_y;
     const Along out_x = next_x_ + x * delta_x_, out_y = next_y_ + y * delta_y_;
     const bool along_x = out_x < out_y;
     const Along out = along_x ? out_x : out_y;
@@ -69,6 +68,11 @@ class QuadWalk {
     *last_iy = iy;
     step();
     return true;
+  }
+  /// As many steps as lie before `end`.
+  void step_up_to(Along end) {
+    ix += next_x_ < end ? (static_cast<int>((end - 1 - next_x_) / delta_x_) + 1) * step_x_ : 0;
+    iy += next_y_ < end ? (static_cast<int>((end - 1 - next_y_) / delta_y_) + 1) * step_y_ : 0;
   }
   int ix, iy;
 
@@ -130,24 +134,40 @@ RayEnd cast(const TsdfGrid& grid, const ContourConfig& config, const FreeBlocks*
   };
   const auto inside = static_cast<unsigned>(grid.size_cells() - 1);
   const int first_x = grid.first_x(), first_y = grid.first_y();
+  int asked_x = std::numeric_limits<int>::min(), asked_y = asked_x;  // the last block that was asked for
   while (entered < length) {
     if (static_cast<unsigned>(walk.ix - first_x) >= inside ||
         static_cast<unsigned>(walk.iy - first_y) >= inside)
       break;
-    if (blocks && blocks->free(0, walk.ix, walk.iy)) {
-      int level = 0;
-      while (level + 1 < blocks->levels() && blocks->free(level + 1, walk.ix, walk.iy)) ++level;
-      if (walk.leave_block(FreeBlocks::kShift[level], length, &entered, &positive_ix, &positive_iy)) {
-        positive_at = unknown_from = entered;
-        continue;
-      }
-    } else if (blocks && blocks->unknown(walk.ix, walk.iy)) {
-      // Only where the stretch of unknown may not end the ray.
-      int ix, iy;
-      if (walk.leave_block(FreeBlocks::kShift[0], std::min(length, std::max(unknown_from, blind) + gap),
-                           &entered, &ix, &iy)) {
-        positive_at = -1;
-        continue;
+    const int block_x = walk.ix >> FreeBlocks::kShift, block_y = walk.iy >> FreeBlocks::kShift;
+    if (blocks && (block_x != asked_x || block_y != asked_y)) {
+      asked_x = block_x;
+      asked_y = block_y;
+      FreeBlocks::Square square;
+      switch (blocks->kind(walk.ix, walk.iy, &square)) {
+        case FreeBlocks::Kind::kFree:
+          if (walk.leave(square, length, &entered, &positive_ix, &positive_iy)) {
+            positive_at = unknown_from = entered;
+          } else {
+            walk.step_up_to(length);
+            entered = positive_at = length;
+            end.kind = RayEnd::Kind::kFree;
+            end.last_seen_s = grid.last_seen_s(walk.ix, walk.iy);
+          }
+          continue;
+        case FreeBlocks::Kind::kUnknown: {
+          // Only where the stretch of unknown may not end the ray.
+          const Along limit = std::min(length, std::max(unknown_from, blind) + gap);
+          int ix, iy;
+          if (walk.leave(square, limit, &entered, &ix, &iy) ||
+              walk.leave(FreeBlocks::block(walk.ix, walk.iy), limit, &entered, &ix, &iy)) {
+            positive_at = -1;
+            continue;
+          }
+          break;
+        }
+        case FreeBlocks::Kind::kMixed:
+          break;
       }
     }
     const Along leaves = std::min(walk.leaves_at(), length);
@@ -226,7 +246,7 @@ void extract_contour(const TsdfGrid& grid, const ContourConfig& config, const Po
   }
   cos_sin(angle.data(), rays, cosine.data(), sine.data());
   for (std::size_t i = 0; i < rays; ++i) {
-    const RayEnd end = cast(grid, config, blocks.levels() > 0 ? &blocks : nullptr, T.x_m, T.y_m, cosine[i], sine[i], config.range_max_m);
+    const RayEnd end = cast(grid, config, &blocks, T.x_m, T.y_m, cosine[i], sine[i], config.range_max_m);
     const bool unknown = end.kind == RayEnd::Kind::kUnknown;
     scan->range_m[i] = unknown ? kNaN : end.kind == RayEnd::Kind::kFree ? kInf : end.range_m;
     const float age_s = std::max(0.0f, now_age_clock_s - end.last_seen_s);

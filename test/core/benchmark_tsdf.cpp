@@ -43,8 +43,10 @@ TsdfObservation kinect_observation(double wall_m, std::uint32_t sequence) {
   return o;
 }
 
-TsdfGrid hall(double wall_m) {
-  TsdfGrid grid(TsdfConfig{}, 25.0);
+TsdfGrid hall(double wall_m, double resolution_m = TsdfConfig().resolution_m) {
+  TsdfConfig config;
+  config.resolution_m = resolution_m;
+  TsdfGrid grid(config, 25.0);
   std::uint32_t sequence = 0;
   for (int k = 0; k < 36; ++k) {
     TsdfObservation o = kinect_observation(wall_m, ++sequence);
@@ -173,12 +175,13 @@ void bare_gather(benchmark::State& state) {
 BENCHMARK(bare_gather)->Apply(crowds);
 #endif
 
+/// Arguments: distance of the walls [m], side of a cell [mm]: 25 makes a grid of 2,048^2, 50 one of 1,024^2.
 void contour(benchmark::State& state) {
-  const TsdfGrid grid = hall(static_cast<double>(state.range(0)));
+  const TsdfGrid grid = hall(static_cast<double>(state.range(0)), 0.001 * static_cast<double>(state.range(1)));
   RangeScan scan;
   for (auto _ : state) extract_contour(grid, ContourConfig{}, Pose2{}, 0.0f, &scan);
 }
-BENCHMARK(contour)->Arg(3)->Arg(8)->Arg(18)->Unit(benchmark::kMicrosecond)->Apply(shortest);
+BENCHMARK(contour)->ArgsProduct({{3, 8, 18}, {25, 50}})->Unit(benchmark::kMicrosecond)->Apply(shortest);
 
 }  // namespace
 }  // namespace knav

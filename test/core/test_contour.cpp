@@ -265,6 +265,7 @@ TEST(Contour, CrossingFreeBlocksAtOnceFindsWhatSingleStepsFind) {
       TsdfObservation o;
       observation_from(scan, ObservationLimits{}, &o);
       o.sequence = ++sequence;
+      o.age_clock_s = static_cast<float>(sequence);
       o.T_map_sensor = robot;
       grid.add(o);
     }
@@ -272,12 +273,15 @@ TEST(Contour, CrossingFreeBlocksAtOnceFindsWhatSingleStepsFind) {
     contour.rays = 720;
     contour.range_max_m = place % 2 == 0 ? 4.0 : 11.0;
     RangeScan scan;
-    extract_contour(grid, contour, robot, 0.0f, &scan);
+    const float now_s = static_cast<float>(sequence) + 1.0f;
+    extract_contour(grid, contour, robot, now_s, &scan);
     for (std::size_t i = 0; i < 720; ++i) {
       const double angle = robot.yaw_rad + scan.angle_min_rad + static_cast<double>(i) * scan.angle_increment_rad;
       double cosine, sine;
       cos_sin(&angle, 1, &cosine, &sine);
       const RayEnd end = cast_ray(grid, contour, robot.x_m, robot.y_m, cosine, sine, contour.range_max_m);
+      const bool known = end.kind != RayEnd::Kind::kUnknown;
+      ASSERT_EQ(scan.evidence[i], known ? std::exp(-(now_s - end.last_seen_s) / static_cast<float>(contour.evidence_decay_s)) : 0.0f);
       if (end.kind == RayEnd::Kind::kSurface) {
         ++surfaces;
         ASSERT_EQ(scan.range_m[i], end.range_m);
