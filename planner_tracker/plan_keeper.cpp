@@ -15,6 +15,7 @@ constexpr double kUnhurried = 1.5;  ///< times as long as at full speed
 constexpr double kMovesThere_m = 1.0;   ///< of where the way is closed
 constexpr double kNoWayRound_m = 40.0;  ///< so far is a way round that was found closed a moment ago: in a crowd it may be open again soon
 constexpr double kWalkedThere_m = 1.5;  ///< who closes it has walked past so near to there
+constexpr double kBelieved_s = 2.0;  ///< a way looked at and found closed must be seen open for so long to turn back for
 constexpr double kWider_m = 0.05;      ///< a way once found closed must be wider by this on either side to turn back for
 
 }  // namespace
@@ -100,7 +101,15 @@ bool PlanKeeper::hold(CombinedMap& map, const Point2& robot, double now_s, const
   }
   path_.set(way);
   path_kind_ = Outcome::kToBlockage;
+  elsewhere_ = look_elsewhere_ = false;  // it leads to this one now
   return true;
+}
+
+bool PlanKeeper::turns_back_too_soon(const MapLayer& layer, const Point2& robot, double now_s, bool barely_open) {
+  const bool going_to_look = path_kind_ == Outcome::kToBlockage && !holding() && !closed_.empty() && std::isfinite(old_cost_m(layer, &path_, robot));
+  if (!going_to_look || !barely_open) return false;
+  if (open_since_s_ < 0.0) open_since_s_ = now_s;
+  return now_s - open_since_s_ < kBelieved_s;
 }
 
 PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robot, const Point2& goal, double now_s,
@@ -155,6 +164,11 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     const auto barely_open = [&] {
       return kind == Outcome::kToGoal && shut_.barely_open(map, result_.path, config_.hard_radius_m() + kWider_m, now_s);
     };
+    if (kind == Outcome::kToGoal && turns_back_too_soon(layer, robot, now_s, barely_open())) {
+      at_ = last_at_;
+      return Outcome::kToBlockage;
+    }
+    open_since_s_ = -1.0;
     if (was_to_goal && !std::isfinite(old) && hold(map, robot, now_s, trail, barely_open())) return Outcome::kToBlockage;
     held_since_s_ = -1.0;
     elsewhere_ = look_elsewhere_ = false;
@@ -170,7 +184,7 @@ PlanKeeper::Outcome PlanKeeper::replan(CombinedMap& map, const Pose2& T_map_robo
     path_kind_ = kind;
     return kind;
   }
-  held_since_s_ = -1.0;
+  held_since_s_ = open_since_s_ = -1.0;
   if (result_.code == PlanCode::kStartBlocked) {
     at_ = result_.at;
     path_.clear();

@@ -43,7 +43,7 @@ class PlanKeeper {
   void drop_path() {
     path_.clear();
     held_.clear();
-    held_since_s_ = -1.0;
+    held_since_s_ = open_since_s_ = -1.0;
     elsewhere_ = look_elsewhere_ = false;
   }
   /// @param trail  points of the map at which somebody walked a moment ago, see MovingCells
@@ -82,6 +82,9 @@ class PlanKeeper {
   /// @param round_is_shut  it leads through what was found closed
   bool hold(CombinedMap& map, const Point2& robot, double now_s, const std::vector<Point2>& trail, bool round_is_shut);
   void take(const std::vector<Point2>& path);
+  /// True if a way that was looked at and found closed seems open again, barely, and only since a moment ago, to a robot on its way to look at
+  /// another one. A lane just as wide as the robot does that.
+  bool turns_back_too_soon(const MapLayer& layer, const Point2& robot, double now_s, bool barely_open);
   /// There is no way now. Would there be one, where is it closed, and where can that be looked at from?
   Outcome go_and_look(CombinedMap& map, const Point2& robot, const Point2& goal, double now_s);
   /// A way's direction beyond a point of its segment from way[segment - 1] to way[segment]. There it leads through what is
@@ -113,6 +116,7 @@ class PlanKeeper {
   Path held_, tried_;
   double held_since_s_ = -1.0, to_see_s_ = 0.0;
   double strict_until_s_ = -1.0;  ///< see too_narrow()
+  double open_since_s_ = -1.0;    ///< see turns_back_too_soon()
   bool strict_ = false;
   bool held_for_somebody_ = false;  ///< who walked there
   struct LeftTo {

@@ -148,6 +148,7 @@ PlanKeeper::Outcome PlanKeeper::go_and_look(CombinedMap& map, const Point2& robo
   if (look_elsewhere_ && (++looks_ >= kEnoughLooks || another_way(map, robot, goal))) {
     looks_ = 0;
     closed_.push_back(at_);
+    shut_.add(at_, now_s, now_s + config_.planning.closed_memory_s);
     // Another way to be looked at? If not, back to this one, from where it was not looked at last.
     look_elsewhere_ = false;
     path_.clear();

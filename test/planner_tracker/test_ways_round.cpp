@@ -202,6 +202,48 @@ TEST_F(TwoDoors, WhereBothAreShutOneLookAtTheNearOneIsEnoughAndTwoIfThereIsNoOth
   EXPECT_NEAR(looked_at(false, 2), 3.0, 0.3);  // back to it: there is no other
 }
 
+TEST_F(TwoDoors, OnItsWayToTheOtherShutOneTheRobotDoesNotTurnBackForALaneThatOpensForAMoment) {
+  OccupancyGrid shut = rooms(0.0), lane = rooms(0.5);
+  for (OccupancyGrid* seen : {&shut, &lane}) fill(seen, 5.95, 17.0, 6.05, 18.0, 100);
+  PlanKeeper keeper(config_);
+  keeper.set_map(map_);
+  double t = 200.0;
+  const auto see = [&](const OccupancyGrid& seen, const Point2& from, double after_s) {
+    map_.set_local(seen, Pose2{});
+    return keeper.replan(map_, {from.x_m, from.y_m, 0.0}, {10.0, 3.0}, t += after_s);
+  };
+  see(shut, {3.0, 3.0}, 0.0);
+  keeper.look_elsewhere();
+  EXPECT_EQ(see(shut, {3.0, 3.0}, 6.0), PlanKeeper::Outcome::kToBlockage);
+  ASSERT_NEAR(keeper.at().y_m, 17.5, 0.3) << "or this tests nothing";
+  const Path way = keeper.path();
+  for (double along_m = 1.0; along_m < 6.0; along_m += 0.5) {
+    for (const OccupancyGrid* seen : {&lane, &lane, &shut}) {
+      EXPECT_EQ(see(*seen, way.point_at(along_m), 0.3), PlanKeeper::Outcome::kToBlockage) << along_m;
+      EXPECT_NEAR(keeper.at().y_m, 17.5, 0.3) << along_m;
+      EXPECT_GT(keeper.path().end().y_m, 15.0) << along_m;
+    }
+  }
+  // Open for good, though hardly wider than the robot needs.
+  see(lane, way.point_at(6.0), 0.3);
+  EXPECT_EQ(see(lane, way.point_at(6.0), 2.5), PlanKeeper::Outcome::kToGoal);
+  EXPECT_LT(keeper.path().end().y_m, 5.0);
+}
+
+TEST_F(TwoDoors, OnItsWayToTheOtherShutOneTheRobotTurnsBackForADoorThatHasOpened) {
+  OccupancyGrid shut = rooms(0.0), open = rooms(0.9);
+  for (OccupancyGrid* seen : {&shut, &open}) fill(seen, 5.95, 17.0, 6.05, 18.0, 100);
+  PlanKeeper keeper(config_);
+  keeper.set_map(map_);
+  map_.set_local(shut, Pose2{});
+  keeper.replan(map_, {3.0, 3.0, 0.0}, {10.0, 3.0}, 200.0);
+  keeper.look_elsewhere();
+  keeper.replan(map_, {3.0, 3.0, 0.0}, {10.0, 3.0}, 206.0);
+  ASSERT_GT(keeper.path().end().y_m, 15.0);
+  map_.set_local(open, Pose2{});
+  EXPECT_EQ(keeper.replan(map_, {3.0, 4.0, 0.0}, {10.0, 3.0}, 208.0), PlanKeeper::Outcome::kToGoal);
+}
+
 TEST_F(TwoDoors, ANarrowWayThatWasNeverFoundShutIsTaken) {
   look(0.5, 1.0);
   EXPECT_FALSE(goes_round());
