@@ -110,6 +110,7 @@ struct TrackingConfig {
   double moving_distance_m = 0.8;
   double walker_gap_m = 0.3;
   double walker_memory_s = 3.0;
+  double walker_stands_s = 6.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -132,6 +133,9 @@ struct TrackingConfig {
              "Who was seen walking, and is out of view now, is expected to walk on as he did: the robot stops where he and it would come "
              "nearer to each other than this within 2 s. 0 = off.");
     v.number("walker_memory_s", walker_memory_s, 0, 3, "s", "Expected for so long after he was last seen.");
+    v.number("walker_stands_s", walker_stands_s, 0, 60, "s",
+             "He may also have stopped right out of view: for so long, unless seen, a place as wide as somebody counts as occupied where he was "
+             "lost and half a second farther on. 0 = off.");
   }
 };
 

@@ -14,7 +14,6 @@ constexpr double kWalked_m = 0.4;     ///< from where he began
 constexpr double kSlowest_mps = 0.25, kFastest_mps = 2.0;
 constexpr double kForgotten_s = 3.0;
 constexpr double kMissed_s = 0.5;     ///< in view and not seen for so long: he is not there
-constexpr double kMayStand_s = 6.0;   ///< so long after he was lost
 constexpr double kWentOn_s = 0.5, kWentOnStep_s = 0.25;
 constexpr double kHalfView_rad = 0.45;  ///< less than 57 degrees, by what the edges may miss
 constexpr double kViewFrom_m = 0.7, kViewTo_m = 4.0;
@@ -88,6 +87,7 @@ void Walkers::update(const std::vector<Point2>& moving, const MapLayer& layer, c
 
 /// Whom no cluster shows any more, and who is out of view, may stand anywhere on the next bit of his way.
 void Walkers::lose(const Pose2& T_map_robot, double now_s) {
+  if (may_stand_s_ <= 0.0) return;
   const auto shown = [&](const Point2& p) {
     return std::any_of(clusters_.begin(), clusters_.end(), [&](const Point2& c) { return away_m(c, p) < kSame_m; });
   };
@@ -97,7 +97,7 @@ void Walkers::lose(const Pose2& T_map_robot, double now_s) {
   }
   const auto found = [&](const Track& l) {
     const double age_s = now_s - l.seen_s;
-    return age_s < 0.0 || age_s > kMayStand_s || in_view(T_map_robot, l.at) || shown(l.at);
+    return age_s < 0.0 || age_s > may_stand_s_ || in_view(T_map_robot, l.at) || shown(l.at);
   };
   lost_.erase(std::remove_if(lost_.begin(), lost_.end(), found), lost_.end());
   may_stand_at_.clear();

@@ -22,6 +22,9 @@ bool in_view(const Pose2& T_map_robot, const Point2& at);
 /// round the robot, and the local map has him where he was seen last.
 class Walkers {
  public:
+  /// @param may_stand_s  see may_stand_at()
+  explicit Walkers(double may_stand_s) : may_stand_s_(may_stand_s) {}
+
   void clear() {
     tracks_.clear();
     lost_.clear();
@@ -31,7 +34,7 @@ class Walkers {
   /// Where they are expected now: whoever was seen walking within `memory_s`, straight on at his speed.
   void expected(double now_s, double memory_s, std::vector<Walker>* walkers) const;
   /// Middles of places, each as wide as somebody, where one who walked out of view may have stopped: from where he was seen last on for
-  /// the next half second of his way. Until they are seen again, for some seconds at most; the local map has none of them.
+  /// the next half second of his way. Until they are seen again, for `may_stand_s` at most; the local map has none of them.
   const std::vector<Point2>& may_stand_at() const { return may_stand_at_; }
 
  private:
@@ -45,6 +48,7 @@ class Walkers {
   static Point2 at(const Track& track, double now_s);
   void lose(const Pose2& T_map_robot, double now_s);
 
+  double may_stand_s_;
   std::vector<Track> tracks_;
   std::vector<Track> lost_;  ///< walked out of view
   std::vector<Point2> may_stand_at_;

@@ -125,6 +125,7 @@ struct GlobalSearchConfig {
   int unseat_after = 10;
   int unseat_alone_after = 3;
   double unseat_alone_support = 0.75;
+  double unseat_alone_explains = 1.2;
   double repeat_after_m = 0.5;
   double repeat_after_rad = 0.5;
   double repeat_after_s = 1.0;
@@ -156,6 +157,9 @@ struct GlobalSearchConfig {
     v.number("unseat_alone_support", unseat_alone_support, 0, 1, "",
              "... and that this place explains at least this share of the scan (people and moved furniture let others look better, "
              "but seldom well, and seldom one alone).");
+    v.number("unseat_alone_explains", unseat_alone_explains, 0, 10, "",
+             "... and this many times as many rays as the pose that was tracked: a place most of whose view would be unknown ground explains much of "
+             "little.");
     v.number("repeat_after_m", repeat_after_m, 0.05, 50, "m",
              "In doubt, search again after driving this far, ...");
     v.number("repeat_after_rad", repeat_after_rad, 0.05, 50, "rad", "... or turning this far, ...");

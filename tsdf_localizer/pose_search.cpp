@@ -6,11 +6,6 @@
 #include <cmath>
 
 namespace knav {
-namespace {
-
-constexpr double kExplainsMore = 1.2;  ///< times as many rays as the tracked place
-
-}  // namespace
 
 PoseSearch::PoseSearch(const LocalizerConfig& config)
     : config_(config), search_(config.global_search, config.measurement, config.health) {}
@@ -150,7 +145,7 @@ bool PoseSearch::judge(const MapFields& fields, const Pose2& T_filter_now, Belie
       return false;
     }
     // By share of what can be judged there, a place most of whose view is unknown ground explains much with little.
-    const bool explains_more = !mine || static_cast<double>(rival->explained) > kExplainsMore * static_cast<double>(mine->explained);
+    const bool explains_more = !mine || static_cast<double>(rival->explained) > config_.global_search.unseat_alone_explains * static_cast<double>(mine->explained);
     const bool alone = as_good <= 1 && rival->support >= config_.global_search.unseat_alone_support && explains_more;
     if (!unseats_tracked(rival->T_map_base * T_start_now_ * T_filter_now.inverse(), T_filter_now, alone)) return false;
   }

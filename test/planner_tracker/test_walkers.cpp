@@ -43,7 +43,7 @@ class WatchedRoom : public ::testing::Test {
   CombinedMap map_;
   OccupancyGrid grid_;
   MovingCells cells_;
-  Walkers walkers_;
+  Walkers walkers_{6.0};
   std::vector<Walker> expected_;
   Pose2 robot_{2.0, 3.0, 0.0};
   double now_s_ = 100.0;
@@ -105,6 +105,16 @@ TEST_F(WatchedRoom, WhoWalkedOutOfViewMayHaveStoppedOnTheNextBitOfHisWayUntilTha
   EXPECT_EQ(state(ahead), CellState::kSupposed);
   robot_.yaw_rad = 0.4;  // looks there again: what is there is in the local map
   see(last);
+  EXPECT_TRUE(walkers_.may_stand_at().empty());
+}
+
+TEST_F(WatchedRoom, WhereThatIsNotWantedNobodyIsSupposedToHaveStopped) {
+  walkers_ = Walkers(0.0);
+  double y_m = 2.0;
+  for (int i = 0; i < 8; ++i) see(with_somebody({4.0, y_m += 0.7 * 0.2}));
+  robot_.yaw_rad = -kPi / 2;
+  for (int i = 0; i < 3; ++i) see(with_somebody({4.0, y_m}));
+  EXPECT_EQ(expected().size(), 1u) << "he is expected to walk on all the same";
   EXPECT_TRUE(walkers_.may_stand_at().empty());
 }
 
