@@ -70,7 +70,7 @@ class PlanKeeper {
   GridPlanner& planner() { return planner_; }
 
  private:
-  static constexpr double kSamePlace_m = 1.0;  ///< what closes a way there is the same thing
+  static constexpr double kSamePlace_m = 1.0;  ///< what closes a way so near by is the same thing
   static constexpr double kElsewhere_m = 0.6;  ///< another place to look from is this far from the last at least
 
   double old_cost_m(const MapLayer& layer, Path* path, const Point2& robot);
@@ -129,6 +129,7 @@ class PlanKeeper {
   bool look_elsewhere_ = false, elsewhere_ = false;
   int looks_ = 0;                ///< at the present blockage, in vain
   Point2 last_at_;
+  Point2 path_at_;  ///< what path() leads to for a look
   std::vector<Point2> closed_;   ///< looked at on the way to this goal, and closed
   int rounds_ = 0;               ///< of looking at every way; from the second on they are no progress
   Point2 at_;

@@ -8,7 +8,6 @@ namespace knav {
 namespace {
 
 constexpr double kNearestLook_m = 0.25;
-constexpr double kClosedRound_m = 0.6;   ///< what closes a way there belongs together
 constexpr int kEnoughLooks = 2;  ///< from different places, where there is no other way to be looked at
 constexpr double kAsGood_m = 0.15;       ///< so much farther off is as good a place to look from
 constexpr double kStandsBefore_m = 0.6;  ///< what closes a way may reach this far before the point where it does
@@ -120,13 +119,13 @@ bool PlanKeeper::way_to_look(const MapLayer& layer, const MapLayer& unchanged, c
 }
 
 const MapLayer& PlanKeeper::plan_unchanged(CombinedMap& map, const Point2& robot, const Point2& goal) {
-  const MapLayer* unchanged = &map.permissive(closed_, kClosedRound_m);
+  const MapLayer* unchanged = &map.permissive(closed_, kSamePlace_m);
   planner_.plan(*unchanged, robot, goal, &result_);
   if (result_.code != PlanCode::kOk && closed_.size() > 1) {
     // All ways were looked at. What closed the others may have gone since.
     ++rounds_;
     closed_.erase(closed_.begin(), closed_.end() - 1);
-    unchanged = &map.permissive(closed_, kClosedRound_m);
+    unchanged = &map.permissive(closed_, kSamePlace_m);
     planner_.plan(*unchanged, robot, goal, &result_);
   }
   if (result_.code != PlanCode::kOk && !closed_.empty()) {
@@ -139,7 +138,7 @@ const MapLayer& PlanKeeper::plan_unchanged(CombinedMap& map, const Point2& robot
 bool PlanKeeper::another_way(CombinedMap& map, const Point2& robot, const Point2& goal) {
   std::vector<Point2> closed = closed_;
   closed.push_back(at_);
-  planner_.plan(map.permissive(closed, kClosedRound_m), robot, goal, &result_);
+  planner_.plan(map.permissive(closed, kSamePlace_m), robot, goal, &result_);
   return result_.code == PlanCode::kOk;
 }
 
@@ -170,8 +169,9 @@ PlanKeeper::Outcome PlanKeeper::go_and_look(CombinedMap& map, const Point2& robo
   };
   const bool robot_too_near = too_near(robot);
   // What closes the way may be elsewhere than it seemed from afar: then it is looked at from elsewhere, too.
+  const bool still_leads_there = elsewhere_ && std::hypot(path_at_.x_m - at_.x_m, path_at_.y_m - at_.y_m) < 2.0 * kSamePlace_m;
   const bool keep = path_kind_ == Outcome::kToBlockage && !look_elsewhere_ && std::isfinite(old_cost_m(layer, &path_, robot)) &&
-                    (elsewhere_ || looks_at_it(unchanged, path_.end())) && !(robot_too_near && too_near(path_.end()));
+                    (still_leads_there || looks_at_it(unchanged, path_.end())) && !(robot_too_near && too_near(path_.end()));
   if (!keep) {
     elsewhere_ = false;
     if (look_elsewhere_) {
@@ -184,6 +184,7 @@ PlanKeeper::Outcome PlanKeeper::go_and_look(CombinedMap& map, const Point2& robo
     }
     look_elsewhere_ = false;
     elsewhere_ = elsewhere_ || rounds_ > 1 || std::any_of(closed_.begin(), closed_.end(), same_place);
+    path_at_ = at_;
     take(way);
   }
   path_kind_ = Outcome::kToBlockage;

@@ -230,6 +230,27 @@ TEST_F(TwoDoors, OnItsWayToTheOtherShutOneTheRobotDoesNotTurnBackForALaneThatOpe
   EXPECT_LT(keeper.path().end().y_m, 5.0);
 }
 
+TEST_F(TwoDoors, WhatClosesTheWayHalfAMetreFartherOnIsTheSameThing) {
+  // From afar the door looks open, and shut behind it.
+  OccupancyGrid shut = rooms(0.0), behind = rooms(1.0);
+  fill(&behind, 6.3, 2.35, 6.4, 3.65, 100);
+  fill(&behind, 6.0, 2.35, 6.4, 2.45, 100);
+  fill(&behind, 6.0, 3.55, 6.4, 3.65, 100);
+  for (OccupancyGrid* seen : {&shut, &behind}) fill(seen, 5.95, 17.0, 6.05, 18.0, 100);
+  PlanKeeper keeper(config_);
+  keeper.set_map(map_);
+  map_.set_local(shut, Pose2{});
+  keeper.replan(map_, {3.0, 3.0, 0.0}, {10.0, 3.0}, 200.0);
+  keeper.look_elsewhere();
+  keeper.replan(map_, {3.0, 3.0, 0.0}, {10.0, 3.0}, 206.0);
+  ASSERT_NEAR(keeper.at().y_m, 17.5, 0.3) << "or this tests nothing";
+  const Point2 on_its_way = keeper.path().point_at(6.0);
+  map_.set_local(behind, Pose2{});
+  EXPECT_EQ(keeper.replan(map_, {on_its_way.x_m, on_its_way.y_m, 0.0}, {10.0, 3.0}, 216.0), PlanKeeper::Outcome::kToBlockage);
+  EXPECT_NEAR(keeper.at().y_m, 17.5, 0.3);
+  EXPECT_GT(keeper.path().end().y_m, 15.0);
+}
+
 TEST_F(TwoDoors, OnItsWayToTheOtherShutOneTheRobotTurnsBackForADoorThatHasOpened) {
   OccupancyGrid shut = rooms(0.0), open = rooms(0.9);
   for (OccupancyGrid* seen : {&shut, &open}) fill(seen, 5.95, 17.0, 6.05, 18.0, 100);
