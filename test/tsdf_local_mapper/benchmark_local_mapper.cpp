@@ -39,5 +39,20 @@ void whole_step(benchmark::State& state) {
 }
 BENCHMARK(whole_step)->Arg(1000)->Arg(10000)->Iterations(500)->Unit(benchmark::kMillisecond);
 
+/// The square of 20 m round the robot as an occupancy grid, after three seconds of going round.
+void local_map(benchmark::State& state) {
+  const RoomWorld world = RoomWorld::furnished();
+  LocalMapper mapper{LocalMapperConfig()};
+  DrivenRobot robot;
+  for (int k = 0; k < 90; ++k) {
+    robot.drive(0.02, 0.05);
+    mapper.add_odometry(k / 30.0, robot.T_odom_base);
+    mapper.update(world.profile(robot.T_world_base, k / 30.0), Pose2{});
+  }
+  OccupancyGrid map;
+  for (auto _ : state) mapper.extract_local_map(&map);
+}
+BENCHMARK(local_map)->Unit(benchmark::kMicrosecond);
+
 }  // namespace
 }  // namespace knav
