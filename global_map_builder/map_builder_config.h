@@ -166,7 +166,7 @@ struct JointRefinementConfig {
   double merge_m = 0.06;
   double merge_deg = 4.6;
   double far_m = 8.0;
-  double point_weight = 0.15;
+  double point_weight = 0.06;
   double scan_point_weight = 0.1;
   double step_across_share = 0.3;
   double step_heading_share = 0.5;
