@@ -57,7 +57,12 @@ class StandIn:
 
     def __exit__(self, *_):
         self.process.terminate()
-        self.process.wait(20)
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            # A rospy node that is told to end while it is still registering itself may never hear of it.
+            self.process.kill()
+            self.process.wait()
 
 
 class ExternalBenchmark(unittest.TestCase):
