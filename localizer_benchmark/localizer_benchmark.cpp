@@ -147,7 +147,7 @@ int main(int argc, char** argv) {
   app.add_option("--trace", options.trace, "Write BUILDING-ROW-K.tsv, verdict and error of every scan, into this existing folder");
   app.add_flag("--quick", b.quick, "The first 100 s of one drive, three starts, three kidnaps");
   app.add_flag("--fresh", b.fresh, "Simulate again what is in the cache (after a change of the simulator)");
-  app.add_flag("--fresh-scans", b.fresh_scans, "Map again what is in the cache (after a change of the local mapper)");
+  app.add_flag("--fresh-scans", b.fresh_scans, "Map again what is in the cache (after a change of the local mapper); kidnaps are always mapped anew");
   app.add_flag("--record-only", options.record_only, "Fill the cache only");
   app.footer(knav::kJsonHelp);
   return knav::run_command(app, argc, argv, [&] { knav::benchmark(options); });
