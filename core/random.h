@@ -46,7 +46,7 @@ namespace random_stream {
 constexpr std::uint32_t kMotion = 1, kResample = 2, kLocalizerMotion = 3, kLocalizerResample = 4,
                         kLocalizerGlobal = 5, kRecovery = 6, kSimDepth = 7, kSimOdometry = 8, kSimDevice = 9,
                         kSimPeople = 10, kSimLidar = 11, kSimBands = 12, kChanges = 13,
-                        kBootstrap = 14, kSimInfrared = 15, kSensorBenchmark = 16, kFloorSample = 17, kOdometryErrors = 18,
+                        kBootstrap = 14, kSimInfrared = 15, kSensorBenchmark = 16, kFloorSample = 17, kOdometryErrors = 18, kOdometryTiming = 19,
                         kTest = 100;
 }  // namespace random_stream
 

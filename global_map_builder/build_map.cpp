@@ -30,7 +30,7 @@ DIR receives map.yaml, map.pgm (map_server's format), distance.tiff (float32 m, 
 places.yaml, trajectory.tum, graph.g2o, closures.json, closures.yaml (the allow / deny list), report.html, map.png,
 drives.bin (what --extend needs), changes.json (with --extend) and metadata.yaml.
 The JSON of --json holds source, observations (count), frames_used, drives, path_m, keyframes, marks, breaks (times the
-mapper lost the thread), mended_steps (its jumps, mended), fitted_pairs (of keyframes whose views were fitted), closures {found, accepted, button, automatic, located,
+mapper lost the thread), mended_steps (its jumps, mended), settled_keyframes (of a scanner, that stood turned wrongly), fitted_pairs (of keyframes whose views were fitted), closures {found, accepted, button, automatic, located,
 list}, graph {chi2, edges}, map {width_m, height_m, contour_m, checksum}, changes (count), time_s {read, refinement,
 closures, fitting, surface, distance, write, total}, recording_s, memory_mb, seed.
 closures.json holds, for each, from_drive, to_drive, from_stamp_s, to_stamp_s, source, verdict (of the list), matched,

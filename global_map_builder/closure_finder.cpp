@@ -316,7 +316,14 @@ void ClosureFinder::pair_buttons(int drive, int lowest) {
 }
 
 void ClosureFinder::search_from(int keyframe, int lowest) {
-  for (const int visit : earlier_visits(keyframe, lowest)) {
+  const std::vector<int> visits = earlier_visits(keyframe, lowest);
+  std::vector<int> compared = {keyframe};
+  for (const int visit : visits) {
+    const Pose2 prior = graph_.nodes.at(visit).inverse() * graph_.nodes.at(keyframe);
+    if (!tried(visit, keyframe, prior)) compared.push_back(visit);
+  }
+  if (compared.size() > 1) prepare_submaps(compared);
+  for (const int visit : visits) {
     const Pose2 prior = graph_.nodes.at(visit).inverse() * graph_.nodes.at(keyframe);
     const double radius_m = window_for(drift_path_m(visit, keyframe)).radius_m;
     if (distance_m(prior, {}) > config_.closures.nearest_m + radius_m || tried(visit, keyframe, prior))

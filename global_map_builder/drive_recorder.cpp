@@ -1,7 +1,9 @@
 #include "global_map_builder/drive_recorder.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 namespace knav {
 namespace {
@@ -24,20 +26,35 @@ Eigen::Matrix3d step_covariance(const DriveConfig& config, double path_m, double
 }
 
 /// Maps come out better so, in three drives (docs/mapping.md has the figures; both parameters' descriptions say it).
-LocalMapperConfig for_mapping(LocalMapperConfig mapper) {
+LocalMapperConfig for_mapping(LocalMapperConfig mapper, const DriveConfig& config, bool scan) {
   mapper.range_errors.learn = false;
   mapper.filter.thin_rows = 0;
+  if (scan) mapper.odometry_timing.stamp_sd_s = std::max(mapper.odometry_timing.stamp_sd_s, config.scan_stamp_sd_s);
   return mapper;
 }
 
 }  // namespace
 
 DriveRecorder::DriveRecorder(const DriveConfig& config, const LocalMapperConfig& mapper)
-    : config_(config), mapper_(for_mapping(mapper)) {}
+    : config_(config), mapper_config_(mapper) {}
+
+void DriveRecorder::add_odometry(double stamp_s, const Pose2& T_odom_base) {
+  if (mapper_) {
+    mapper_->add_odometry(stamp_s, T_odom_base);
+  } else {
+    early_odometry_.push_back({stamp_s, T_odom_base});
+  }
+}
 
 template <class Observation>
 void DriveRecorder::take(const Observation& observation, const Pose2& T_base_sensor) {
-  const LocalMapperResult& result = mapper_.update(observation, T_base_sensor);
+  constexpr bool kScan = std::is_same_v<Observation, RangeScan>;
+  if (!mapper_) {
+    mapper_.emplace(for_mapping(mapper_config_, config_, kScan));
+    for (const StampedPose2& pose : early_odometry_) mapper_->add_odometry(pose.stamp_s, pose.T_map_robot);
+    early_odometry_ = {};
+  }
+  const LocalMapperResult& result = mapper_->update(observation, T_base_sensor);
   if (!result.accepted) {
     ++refused_;
     last_refusal_ = result.reason;
@@ -66,8 +83,9 @@ void DriveRecorder::take(const Observation& observation, const Pose2& T_base_sen
   drive_.odometry.push_back({result.stamp_s, result.T_odom_base});
 
   if (drive_.keyframes.empty() || break_pending_ || mark_pending_ ||
-      moved(drive_.keyframes.back().T_drive_base, T_drive_base, config_.keyframe_distance_m,
-            config_.keyframe_angle_deg)) {
+      moved(drive_.keyframes.back().T_drive_base, T_drive_base,
+            kScan ? config_.scan_keyframe_distance_m : config_.keyframe_distance_m,
+            kScan ? config_.scan_keyframe_angle_deg : config_.keyframe_angle_deg)) {
     add_keyframe(result, T_drive_base);
   }
   const bool usable = result.outcome != FrameOutcome::kSuspicious;

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "global_map_builder/drive.h"
 #include "global_map_builder/map_builder_config.h"
@@ -15,7 +17,7 @@ class DriveRecorder {
  public:
   DriveRecorder(const DriveConfig& config, const LocalMapperConfig& mapper);
 
-  void add_odometry(double stamp_s, const Pose2& T_odom_base) { mapper_.add_odometry(stamp_s, T_odom_base); }
+  void add_odometry(double stamp_s, const Pose2& T_odom_base);
   void add(const DepthProfile& profile, const Pose2& T_base_camera) { take(profile, T_base_camera); }
   void add(const RangeScan& scan, const Pose2& T_base_sensor) { take(scan, T_base_sensor); }
   /// The next frame stands at a marked place.
@@ -34,7 +36,9 @@ class DriveRecorder {
   void add_keyframe(const LocalMapperResult& result, const Pose2& T_drive_base);
 
   DriveConfig config_;
-  LocalMapper mapper_;
+  LocalMapperConfig mapper_config_;
+  std::optional<LocalMapper> mapper_;  ///< from the first observation on, whose kind decides how it is set
+  Trajectory early_odometry_;          ///< T_odom_base until then
   Drive drive_;
   Pose2 T_drive_local_;
   std::uint32_t epoch_ = 0;

@@ -6,10 +6,16 @@
 namespace knav {
 namespace {
 
-constexpr std::size_t kMaxBins = 200;
+constexpr std::size_t kMaxBins = 200;       // of a depth camera
+constexpr std::size_t kMaxScanBins = 720;   // a scanner's rays are few and good: each counts
 constexpr double kNearFrame_s = 0.5;
 constexpr int kReach_bins = 5;         // neighbours on either side that a normal is fitted to
-constexpr double kMinBaseline_m = 0.1;  // of a normal
+constexpr int kMinBins = 5;
+/// The same of a scanner, as an angle; and the fewest, for what is short: along a corridor only the faces of door frames and cupboards
+/// tell how far the robot came.
+constexpr double kScanReach_rad = 1.5 * kPi / 180.0;
+constexpr int kMinScanReach_bins = 2, kMaxScanReach_bins = 12;
+constexpr double kMinBaseline_m = 0.1, kMinScanBaseline_m = 0.02;  // of a normal
 constexpr double kNormal_sd_m = 0.005;   // whatever the angle
 constexpr double kRangeMin_m = 0.3, kRangeMax_m = 20.0;
 constexpr double kMerge_s = 5.0;         // frames farther apart in time are not averaged
@@ -45,6 +51,7 @@ DriveView::DriveView(const JointRefinementConfig& config, const Drive& drive, in
 
 void DriveView::fill(const DepthProfile& profile) {
   pinhole_ = true;
+  reach_bins_ = kReach_bins;
   fx_px_ = profile.fx_px;
   cx_px_ = profile.cx_px;
   const std::size_t columns = profile.z_m.size(), width = std::max<std::size_t>(1, (columns + kMaxBins - 1) / kMaxBins);
@@ -133,8 +140,10 @@ void DriveView::fill(const RangeScan& scan) {
   pinhole_ = false;
   angle_min_rad_ = scan.angle_min_rad;
   angle_increment_rad_ = scan.angle_increment_rad;
-  const std::size_t rays = scan.range_m.size(), width = std::max<std::size_t>(1, (rays + kMaxBins - 1) / kMaxBins);
+  const std::size_t rays = scan.range_m.size(), width = std::max<std::size_t>(1, (rays + kMaxScanBins - 1) / kMaxScanBins);
   bin_columns_ = static_cast<double>(width);
+  const double bin_rad = bin_columns_ * std::fabs(scan.angle_increment_rad);
+  reach_bins_ = std::clamp(static_cast<int>(std::lround(kScanReach_rad / std::max(bin_rad, 1e-4))), kMinScanReach_bins + 1, kMaxScanReach_bins);
   for (std::size_t first = 0; first + width <= rays; first += width) {
     ViewPoint& point = points_.emplace_back();
     const std::size_t ray = first + width / 2;
@@ -162,48 +171,52 @@ void DriveView::place(const RangeOffset& offset) {
 }
 
 void DriveView::find_normals() {
-  const auto count = static_cast<int>(points_.size());
-  const Eigen::Vector2d eye(T_keyframe_sensor_.x_m, T_keyframe_sensor_.y_m);
-  for (int i = 0; i < count; ++i) {
-    ViewPoint& p = points_[static_cast<std::size_t>(i)];
-    p.straight = false;
-    if (!p.valid) continue;
-    const double range_m = (p.position - eye).norm(), sd_m = range_sd_m(pinhole_, range_m);
-    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-    Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
-    int n = 0;
-    for (int k = std::max(0, i - kReach_bins); k <= std::min(count - 1, i + kReach_bins); ++k) {
-      const ViewPoint& q = points_[static_cast<std::size_t>(k)];
-      if (!q.valid) continue;
-      const Eigen::Vector2d d = q.position - p.position;
-      sum += d;
-      squares += d * d.transpose();
-      ++n;
-    }
-    if (n < kReach_bins) continue;
-    const Eigen::Vector2d mean = sum / n;
-    const Eigen::Matrix2d spread = squares / n - mean * mean.transpose();
-    // The smaller axis of a 2 x 2 covariance.
-    const double half = 0.5 * (spread(0, 0) + spread(1, 1));
-    const double root = std::hypot(0.5 * (spread(0, 0) - spread(1, 1)), spread(0, 1));
-    const double across = std::max(0.0, half - root), along = half + root;
-    const double angle = 0.5 * std::atan2(2.0 * spread(0, 1), spread(0, 0) - spread(1, 1));
-    Eigen::Vector2d normal(-std::sin(angle), std::cos(angle));
-    const Eigen::Vector2d ray = (p.position - eye) / range_m;
-    if (normal.dot(ray) > 0.0) normal = -normal;  // towards the sensor
-    const double cosine = -normal.dot(ray);
-    p.range_m = range_m;
-    p.sd_m = kNormal_sd_m + sd_m * cosine;
-    if (std::sqrt(along) < kMinBaseline_m || std::sqrt(across) > p.sd_m || std::fabs(normal.dot(mean)) > 2.0 * p.sd_m ||
-        across > 0.1 * along) {
-      continue;
-    }
-    // What is steadily wrong with far readings is the same for a whole wall, and grows faster than their noise.
-    if (pinhole_) p.sd_m *= 1.0 + range_m * range_m / (far_m_ * far_m_);
-    p.normal = normal;
-    p.on_line = p.position + mean.dot(normal) * normal;
-    p.straight = true;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    points_[i].straight = false;
+    if (!points_[i].valid) continue;
+    find_normal(i, reach_bins_);
+    if (!pinhole_ && !points_[i].straight) find_normal(i, kMinScanReach_bins);
   }
+}
+
+void DriveView::find_normal(std::size_t i, int reach_bins) {
+  const auto count = static_cast<int>(points_.size()), at = static_cast<int>(i);
+  const Eigen::Vector2d eye(T_keyframe_sensor_.x_m, T_keyframe_sensor_.y_m);
+  ViewPoint& p = points_[i];
+  const double range_m = (p.position - eye).norm(), sd_m = range_sd_m(pinhole_, range_m);
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
+  int n = 0;
+  for (int k = std::max(0, at - reach_bins); k <= std::min(count - 1, at + reach_bins); ++k) {
+    const ViewPoint& q = points_[static_cast<std::size_t>(k)];
+    if (!q.valid) continue;
+    const Eigen::Vector2d d = q.position - p.position;
+    sum += d;
+    squares += d * d.transpose();
+    ++n;
+  }
+  if (n < kMinBins) return;
+  const Eigen::Vector2d mean = sum / n;
+  const Eigen::Matrix2d spread = squares / n - mean * mean.transpose();
+  // The smaller axis of a 2 x 2 covariance.
+  const double half = 0.5 * (spread(0, 0) + spread(1, 1));
+  const double root = std::hypot(0.5 * (spread(0, 0) - spread(1, 1)), spread(0, 1));
+  const double across = std::max(0.0, half - root), along = half + root;
+  const double angle = 0.5 * std::atan2(2.0 * spread(0, 1), spread(0, 0) - spread(1, 1));
+  Eigen::Vector2d normal(-std::sin(angle), std::cos(angle));
+  const Eigen::Vector2d ray = (p.position - eye) / range_m;
+  if (normal.dot(ray) > 0.0) normal = -normal;  // towards the sensor
+  p.range_m = range_m;
+  p.sd_m = kNormal_sd_m - sd_m * normal.dot(ray);
+  if (std::sqrt(along) < (pinhole_ ? kMinBaseline_m : kMinScanBaseline_m) || std::sqrt(across) > p.sd_m ||
+      std::fabs(normal.dot(mean)) > 2.0 * p.sd_m || across > 0.1 * along) {
+    return;
+  }
+  // What is steadily wrong with far readings is the same for a whole wall, and grows faster than their noise.
+  if (pinhole_) p.sd_m *= 1.0 + range_m * range_m / (far_m_ * far_m_);
+  p.normal = normal;
+  p.on_line = p.position + mean.dot(normal) * normal;
+  p.straight = true;
 }
 
 int DriveView::bin_of(const Eigen::Vector2d& point) const {

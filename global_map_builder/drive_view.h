@@ -48,11 +48,13 @@ class DriveView {
   int bin_at(const Point2& in_sensor) const;
   void average(const JointRefinementConfig& config, const std::vector<DriveFrame>& frames, std::size_t own);
   void find_normals();
+  void find_normal(std::size_t point, int reach_bins);
 
   Pose2 T_keyframe_sensor_;
   bool pinhole_ = true;
   double fx_px_ = 1.0, cx_px_ = 0.0, angle_min_rad_ = 0.0, angle_increment_rad_ = 1.0;
   double bin_columns_ = 1.0;
+  int reach_bins_ = 1;  ///< neighbours on either side that a normal is fitted to
   double far_m_ = 1.0;
   std::vector<ViewPoint> points_;
 };

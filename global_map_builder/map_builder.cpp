@@ -10,11 +10,13 @@
 #include "core/config.h"
 #include "core/error.h"
 #include "global_map_builder/closure_finder.h"
+#include "global_map_builder/closure_review.h"
 #include "global_map_builder/contour_distance.h"
 #include "global_map_builder/drive_smoother.h"
 #include "global_map_builder/joint_refiner.h"
 #include "global_map_builder/map_occupancy.h"
 #include "global_map_builder/map_surface.h"
+#include "global_map_builder/scan_settler.h"
 
 namespace knav {
 namespace {
@@ -171,6 +173,8 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
   for (Drive& drive : drives_) {
     built.mended_steps += smooth_drive(config_.refinement, config_.graph, config_.surface, &drive,
                                        [&](double fraction) { report("refinement", fraction); });
+    built.settled_keyframes +=
+        settle_scans(config_.settling, config_.joint, &drive, [&](double fraction) { report("settling", fraction); });
   }
   end_stage("refinement");
 
@@ -194,8 +198,16 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
   JointRefinementConfig fitting = config_.joint;
   fitting.enabled = fitting.enabled && std::any_of(built.record.closures.begin(), built.record.closures.end(),
                                                    [](const Closure& c) { return c.accepted; });
-  const JointRefinement joint = refine_jointly(fitting, drives, built.graph, config_.graph.robust_scale,
-                                               [&](double fraction) { report("fitting", fraction); });
+  const auto fit = [&] {
+    return refine_jointly(fitting, drives, built.graph, config_.graph.robust_scale,
+                          [&](double fraction) { report("fitting", fraction); });
+  };
+  JointRefinement joint = fit();
+  if (joint.kept && refuse_contradicted(config_.closures, joint.T_map_keyframe, &built.graph, &built.record.closures)) {
+    for (auto& [id, pose] : built.graph.nodes) pose = joint.T_map_keyframe[static_cast<std::size_t>(id)];
+    const JointRefinement again = fit();
+    if (again.kept) joint = again;
+  }
   built.record.T_map_keyframe = joint.T_map_keyframe;
   if (joint.kept) built.fitted_pairs = joint.pairs;
   for (auto& [id, pose] : built.graph.nodes) pose = joint.T_map_keyframe[static_cast<std::size_t>(id)];

@@ -25,6 +25,7 @@ struct BuiltMap {
   OccupancyGrid before;            ///< coarse: without closures and refinement
   std::vector<MapChange> changes;  ///< against the map that was extended
   int old_drives = 0;              ///< of the map that was extended
+  int settled_keyframes = 0;       ///< of a scanner, that stood turned wrongly
   int mended_steps = 0;            ///< where the mapper jumped
   std::size_t fitted_pairs = 0;    ///< of keyframes, in the joint refinement; 0 if it was not kept
   std::map<std::string, double> stage_s;

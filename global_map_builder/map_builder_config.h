@@ -16,6 +16,9 @@ struct DriveConfig {
   double frame_period_s = 1.0;
   double keyframe_distance_m = 0.25;
   double keyframe_angle_deg = 8.0;
+  double scan_keyframe_distance_m = 0.1;
+  double scan_keyframe_angle_deg = 4.0;
+  double scan_stamp_sd_s = 0.03;
   double position_sd_per_m = 0.02;
   double position_sd_floor_m = 0.0025;
   double heading_sd_deg_per_m = 0.4;
@@ -31,6 +34,11 @@ struct DriveConfig {
     v.number("keyframe_distance_m", keyframe_distance_m, 0.05, 10, "m",
              "A node of the graph after this distance ...");
     v.number("keyframe_angle_deg", keyframe_angle_deg, 1, 180, "deg", "... or this turn.");
+    v.number("scan_keyframe_distance_m", scan_keyframe_distance_m, 0.05, 10, "m",
+             "The same of a scanner, whose every frame is good enough to be fitted by itself: this distance ...");
+    v.number("scan_keyframe_angle_deg", scan_keyframe_angle_deg, 1, 180, "deg", "... or this turn.");
+    v.number("scan_stamp_sd_s", scan_stamp_sd_s, 0, 1, "s",
+             "local_mapper/odometry_timing/stamp_sd_s of a drive recorded with a scanner, unless that is more.");
     v.number("position_sd_per_m", position_sd_per_m, 1e-4, 1, "m/m",
              "Position error (sd) of the local mapper per distance, of one metre; grows as the root of the "
              "distance.");
@@ -69,6 +77,8 @@ struct ClosureConfig {
   int locate_agreeing = 3;
   double allowed_sd_m = 0.05;
   double allowed_sd_deg = 0.5;
+  double fitted_max_m = 0.5;
+  double fitted_max_deg = 5.0;
   double falsify_share = 0.0;
   int falsify_seed = 1;
   MatchConfig match;
@@ -108,6 +118,9 @@ struct ClosureConfig {
     v.number("allowed_sd_m", allowed_sd_m, 0.001, 5, "m",
              "How well a closure of the user's list is trusted (sd).");
     v.number("allowed_sd_deg", allowed_sd_deg, 0.01, 90, "deg", "Likewise its heading.");
+    v.number("fitted_max_m", fitted_max_m, 0.05, 100, "m",
+             "A closure that lies farther than this from where the visits are once all views are fitted is refused after all, ...");
+    v.number("fitted_max_deg", fitted_max_deg, 0.5, 180, "deg", "... and one that is turned more.");
     v.number("falsify_share", falsify_share, 0, 1, "",
              "For measuring robustness: this share of the closures found is moved by metres on purpose.");
     v.integer("falsify_seed", falsify_seed, 0, 1000000, "", "Which ones.");
@@ -155,6 +168,29 @@ struct RefinementConfig {
   }
 };
 
+/// Setting right single keyframes of a scanner's drive, before the closures.
+struct SettlingConfig {
+  bool enabled = true;
+  double span_m = 3.0;
+  double max_turn_deg = 30.0;
+  double turn_step_deg = 2.0;
+  double max_move_m = 0.5;
+  double min_gain = 1.2;
+  int passes = 2;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.flag("enabled", enabled, "Try each keyframe of a scanner at other headings.");
+    v.number("span_m", span_m, 0.2, 20, "m", "Against those up to this far along the drive, ...");
+    v.number("max_turn_deg", max_turn_deg, 0, 90, "deg", "... turned by up to this, ...");
+    v.number("turn_step_deg", turn_step_deg, 0.2, 10, "deg", "... in such steps.");
+    v.number("max_move_m", max_move_m, 0, 5, "m", "One that would have to move farther than this stays.");
+    v.number("min_gain", min_gain, 1, 10, "", "So many times as many of its points must fit.");
+    v.integer("passes", passes, 1, 10, "", "Times, for neighbours that were wrong too.");
+  }
+  std::vector<std::string> validate() const { return {}; }
+};
+
 /// Bending the whole drive until all that was seen fits together, after the closures.
 struct JointRefinementConfig {
   bool enabled = true;
@@ -167,7 +203,7 @@ struct JointRefinementConfig {
   double merge_deg = 4.6;
   double far_m = 8.0;
   double point_weight = 0.06;
-  double scan_point_weight = 0.1;
+  double scan_point_weight = 0.3;
   double step_across_share = 0.3;
   double step_heading_share = 0.5;
   double odometry_sd_per_m = 0.025;
@@ -213,6 +249,7 @@ struct JointRefinementConfig {
 struct MapBuilderConfig {
   DriveConfig drive;
   RefinementConfig refinement;
+  SettlingConfig settling;
   ClosureConfig closures;
   GraphOptimizerConfig graph;
   JointRefinementConfig joint;
@@ -227,6 +264,7 @@ struct MapBuilderConfig {
   void visit(Visitor& v) {
     v.group("drive", drive, "Frames, keyframes and the edges between them.");
     v.group("refinement", refinement, "Direct alignment along the drive.");
+    v.group("settling", settling, "Single keyframes of a scanner that are turned wrongly.");
     v.group("closures", closures, "Visits of the same place.");
     v.group("graph", graph, "The optimiser.");
     v.group("joint", joint, "Fitting all views together.");
@@ -246,6 +284,9 @@ struct MapBuilderConfig {
     std::vector<std::string> faults = refinement.validate();
     if (drive.keyframe_distance_m < drive.frame_distance_m) {
       faults.push_back("drive/keyframe_distance_m must not be below drive/frame_distance_m.");
+    }
+    if (drive.scan_keyframe_distance_m < drive.frame_distance_m) {
+      faults.push_back("drive/scan_keyframe_distance_m must not be below drive/frame_distance_m.");
     }
     return faults;
   }

@@ -110,6 +110,7 @@ Json figures_of(const BuiltMap& built) {
                {"keyframes", record.T_map_keyframe.size()},
                {"breaks", breaks},
                {"mended_steps", built.mended_steps},
+               {"settled_keyframes", built.settled_keyframes},
                {"fitted_pairs", built.fitted_pairs},
                {"closures", closures},
                {"graph", {{"chi2", chi2(built.graph)}, {"edges", built.graph.edges.size()}}},

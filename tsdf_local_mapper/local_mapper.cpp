@@ -88,7 +88,7 @@ struct LocalMapper::State {
         limits(limits_of(c)),
         grid(c.tsdf, c.grid_half_size_m),
         window(c.window),
-        filter(c.filter, c.motion, c.odometry_errors, static_cast<std::uint64_t>(c.seed)),
+        filter(c.filter, c.motion, c.odometry_errors, c.odometry_timing, static_cast<std::uint64_t>(c.seed)),
         readings(c.filter, c.motion),
         odometry_bound(c.odometry_bound, c.motion),
         view_check(c.continuity, c.contour, c.range_max_m),
@@ -248,7 +248,7 @@ void LocalMapper::State::align(const Pose2& T_step, const Pose2& T_base_sensor, 
     filter.shift(T_step);
     result.outcome = FrameOutcome::kParked;
   } else {
-    filter.predict(T_step);
+    filter.predict(T_step, dt_s);
     if (enough) {
       filter.update(grid, &points, result.stamp_s, evidence_of(dt_s));
     } else {

@@ -8,6 +8,7 @@
 #include "core/tsdf_grid.h"
 #include "tsdf_local_mapper/close_obstacles.h"
 #include "tsdf_local_mapper/odometry_bound.h"
+#include "tsdf_local_mapper/odometry_timing.h"
 #include "tsdf_local_mapper/range_errors.h"
 #include "tsdf_local_mapper/steady_errors.h"
 #include "tsdf_local_mapper/window_config.h"
@@ -139,6 +140,7 @@ struct LocalMapperConfig {
   FilterConfig filter;
   MotionModelConfig motion;
   SteadyErrorsConfig odometry_errors;
+  OdometryTimingConfig odometry_timing;
   OdometryBoundConfig odometry_bound;
   RangeErrorsConfig range_errors;
   ContourConfig contour;
@@ -162,6 +164,7 @@ struct LocalMapperConfig {
     v.group("window", window, "What the map remembers.");
     v.group("filter", filter, "The particle filter.");
     v.group("motion", motion, "How wrong odometry may be from step to step.");
+    v.group("odometry_timing", odometry_timing, "Odometry whose stamps are off.");
     v.group("odometry_errors", odometry_errors, "How wrong it may be steadily, which the filter learns.");
     v.group("odometry_bound", odometry_bound, "How far from it alignment may lead where little is in view.");
     v.group("range_errors", range_errors, "How wrong the depth camera may be steadily, which the mapper learns.");

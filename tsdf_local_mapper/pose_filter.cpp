@@ -22,8 +22,8 @@ double mean_weight(const WeightedPoints& points) {
 }  // namespace
 
 PoseFilter::PoseFilter(const FilterConfig& config, const MotionModelConfig& motion, const SteadyErrorsConfig& errors,
-                       std::uint64_t seed)
-    : config_(config), motion_(motion), seed_(seed), odometry_errors_(errors) {
+                       const OdometryTimingConfig& timing, std::uint64_t seed)
+    : config_(config), motion_(motion), seed_(seed), odometry_errors_(errors), timing_(timing) {
   particles_.resize(static_cast<std::size_t>(config.particles));
   odometry_errors_.forget(particles_.size());
   ancestor_.resize(particles_.size());
@@ -34,6 +34,7 @@ void PoseFilter::start_at(const Pose2& pose, double stamp_s) {
   for (std::size_t i = 0; i < particles_.size(); ++i) particles_.set(i, pose);
   std::fill(particles_.weight.begin(), particles_.weight.end(), 1.0 / static_cast<double>(particles_.size()));
   for (std::size_t i = 0; i < ancestor_.size(); ++i) ancestor_[i] = static_cast<std::uint32_t>(i);
+  if (timing_.on()) timing_.forget(particles_.size());
   mark_stamp_s_ = stamp_s;
   mean_ = pose;
   covariance_.setZero();
@@ -41,13 +42,17 @@ void PoseFilter::start_at(const Pose2& pose, double stamp_s) {
   effective_ = static_cast<double>(particles_.size());
 }
 
-void PoseFilter::predict(const Pose2& T_before_after) {
+void PoseFilter::predict(const Pose2& T_before_after, double dt_s) {
+  const bool timed = timing_.on() && dt_s > 0.0;
+  if (timed) timing_.take_out(&particles_);
+  const std::uint64_t step = step_;
   if (!odometry_errors_.on()) {
     sample_motion(motion_, T_before_after, seed_, random_stream::kMotion, step_++, particles_);
-    return;
+  } else {
+    odometry_errors_.move(T_before_after, motion_noise(motion_, T_before_after), seed_, step_, &particles_);
+    step_ += 2;
   }
-  odometry_errors_.move(T_before_after, motion_noise(motion_, T_before_after), seed_, step_, &particles_);
-  step_ += 2;
+  if (timed) timing_.add(T_before_after, dt_s, seed_, step, &particles_);
 }
 
 void PoseFilter::shift(const Pose2& T_before_after) {
@@ -92,6 +97,7 @@ void PoseFilter::resample() {
   for (std::size_t i = 0; i < parent_.size(); ++i) ancestor_scratch_[i] = ancestor_[parent_[i]];
   ancestor_.swap(ancestor_scratch_);
   odometry_errors_.resample(parent_);
+  timing_.resample(parent_);
 }
 
 void PoseFilter::jitter(const Pose2& center, const Eigen::Matrix3d& covariance, double width) {
@@ -137,6 +143,7 @@ void PoseFilter::update(const TsdfGrid& grid, WeightedPoints* readings, double s
   effective_ = effective_sample_size(particles_);
   mean_cost_ = 0.0;
   for (std::size_t i = 0; i < particles_.size(); ++i) mean_cost_ += particles_.weight[i] * cost_[i];
+  timing_.learn(particles_.weight);
   if (effective_ < 0.5 * static_cast<double>(particles_.size())) resample();
   track_ancestors(stamp_s);
 }

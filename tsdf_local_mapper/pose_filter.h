@@ -8,6 +8,7 @@
 #include "core/tsdf_grid.h"
 #include "core/weighted_points.h"
 #include "tsdf_local_mapper/local_mapper_config.h"
+#include "tsdf_local_mapper/odometry_timing.h"
 #include "tsdf_local_mapper/steady_errors.h"
 
 namespace knav {
@@ -17,12 +18,12 @@ namespace knav {
 class PoseFilter {
  public:
   PoseFilter(const FilterConfig& config, const MotionModelConfig& motion, const SteadyErrorsConfig& errors,
-             std::uint64_t seed);
+             const OdometryTimingConfig& timing, std::uint64_t seed);
 
   /// All particles at one pose. What was learned of odometry's errors stays: it is the same robot.
   void start_at(const Pose2& pose, double stamp_s);
   /// Odometry's step with its noise.
-  void predict(const Pose2& T_before_after);
+  void predict(const Pose2& T_before_after, double dt_s);
   /// Weighs the particles by how well the readings fit, refines them, and leaves the estimate in mean() etc.
   /// Sets the readings' weights.
   /// @param evidence  in (0, 1], how much of the frame is new
@@ -38,6 +39,8 @@ class PoseFilter {
   double effective_particles() const { return effective_; }
   /// How long the last generation of hypotheses lived: until nine in ten had no descendants left.
   double lifespan_s() const { return lifespan_s_; }
+  /// How far off odometry's stamps usually are (sd).
+  double odometry_stamp_sd_s() const { return timing_.sd_s(); }
   const ParticleSet& particles() const { return particles_; }
 
  private:
@@ -52,6 +55,7 @@ class PoseFilter {
   std::uint64_t seed_;
   std::uint64_t step_ = 0;
   SteadyErrors odometry_errors_;
+  OdometryTiming timing_;
   ParticleSet particles_;
   std::vector<float> cost_;
   std::vector<std::uint32_t> parent_, ancestor_, ancestor_scratch_;
