@@ -1,5 +1,8 @@
 #include "core/tsdf_grid.h"
 
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,6 +11,9 @@
 
 namespace knav {
 namespace {
+
+constexpr int kPartsAThread = 4;  // rows differ in length
+constexpr int kFewestRows = 16;   // of a part
 
 /// Which column of the observation sees a cell, and how far the cell is. The first part of equation 3.
 struct RowProjection {
@@ -183,9 +189,12 @@ TsdfGrid::TsdfGrid(const TsdfConfig& config, double half_size_m, bool vectors) :
   quad_stride_ = size_ + 16;
   quad_.resize(static_cast<std::size_t>(size_) * static_cast<std::size_t>(quad_stride_));
   contradictions_.resize(count);
-  row_column_.resize(static_cast<std::size_t>(size_));
-  row_distance_m_.resize(static_cast<std::size_t>(size_));
-  row_angle_rad_.resize(static_cast<std::size_t>(size_));
+  rows_.resize(config.threads > 1 ? static_cast<std::size_t>(kPartsAThread * config.threads) : 1);
+  for (Rows& rows : rows_) {
+    rows.column.resize(static_cast<std::size_t>(size_));
+    rows.distance_m.resize(static_cast<std::size_t>(size_));
+    rows.angle_rad.resize(static_cast<std::size_t>(size_));
+  }
   clear();
 }
 
@@ -275,15 +284,37 @@ double TsdfGrid::row_reach_m(const TsdfObservation& o, int iy) const {
 template <bool kAdd>
 void TsdfGrid::apply(const TsdfObservation& o, const TsdfRing& part) {
   if (!(o.reach_m > 0.0f)) return;
-  const View view(o);
-  const double most_m = std::min(o.reach_m, part.to_m);
-  const int radius = static_cast<int>(most_m / config_.resolution_m) + 2;
+  const int radius = static_cast<int>(std::min(o.reach_m, part.to_m) / config_.resolution_m) + 2;
   const int sensor_y = cell_of(o.T_map_sensor.y_m);
-  const auto cos_yaw = static_cast<float>(std::cos(o.T_map_sensor.yaw_rad));
-  const auto sin_yaw = static_cast<float>(std::sin(o.T_map_sensor.yaw_rad));
   const int low_y = std::max(first_y_, sensor_y - radius);
   const int high_y = std::min(first_y_ + size_, sensor_y + radius + 1);
-  TsdfChange below;  // of the row before, in absolute cells
+  if (low_y >= high_y) return;
+  const int parts = std::clamp((high_y - low_y) / kFewestRows, 1, static_cast<int>(rows_.size()));
+  const auto start_of = [&](int k) { return low_y + (high_y - low_y) * k / parts; };
+  const auto apply_part = [&](int k) {
+    apply_rows<kAdd>(o, part, start_of(k), start_of(k + 1), &rows_[static_cast<std::size_t>(k)]);
+  };
+  if (parts == 1) {
+    apply_part(0);
+  } else {
+    tbb::parallel_for(0, parts, apply_part, tbb::simple_partitioner());
+  }
+  // Sums are of integers, and what is left stands between two parts: the same bytes whatever the number of threads.
+  rebuild_quads(low_y - 1, {}, rows_[0].first);
+  for (int k = 0; k < parts; ++k) {
+    Rows& rows = rows_[static_cast<std::size_t>(k)];
+    rebuild_quads(start_of(k + 1) - 1, rows.last, k + 1 < parts ? rows_[static_cast<std::size_t>(k) + 1].first : TsdfChange{});
+    contradicted_ += rows.contradicted;
+  }
+}
+
+template <bool kAdd>
+void TsdfGrid::apply_rows(const TsdfObservation& o, const TsdfRing& part, int low_y, int high_y, Rows* rows) {
+  const View view(o);
+  const double most_m = std::min(o.reach_m, part.to_m);
+  const auto cos_yaw = static_cast<float>(std::cos(o.T_map_sensor.yaw_rad));
+  const auto sin_yaw = static_cast<float>(std::sin(o.T_map_sensor.yaw_rad));
+  rows->contradicted = 0;
   for (int iy = low_y; iy < high_y; ++iy) {
     double low = 0.0, high = 0.0;
     TsdfChange change;
@@ -291,20 +322,26 @@ void TsdfGrid::apply(const TsdfObservation& o, const TsdfRing& part) {
       // Whole groups of eight, which vector code takes at once.
       const int from = std::max(first_x_, (cell_of(o.T_map_sensor.x_m + low) - 1) & ~7);
       const int to = std::min(first_x_ + size_, (cell_of(o.T_map_sensor.x_m + high) + 9) & ~7);
-      if (from < to) change = apply_row<kAdd>(o, cos_yaw, sin_yaw, iy, from, to, part);
+      if (from < to) change = apply_row<kAdd>(o, cos_yaw, sin_yaw, iy, from, to, part, rows);
     }
-    // A row of quads stands on two rows of cells.
-    if (!below.empty() || !change.empty()) {
-      rebuild_quads(iy - 1, std::min(below.first, change.first) - 1, std::max(below.last, change.last) + 1);
+    if (iy == low_y) {
+      rows->first = change;
+    } else {
+      rebuild_quads(iy - 1, rows->last, change);
     }
-    below = change;
+    rows->last = change;
   }
-  if (!below.empty()) rebuild_quads(high_y - 1, below.first - 1, below.last + 1);
+}
+
+/// A row of quads stands on two rows of cells, which changed here.
+void TsdfGrid::rebuild_quads(int iy, const TsdfChange& below, const TsdfChange& above) {
+  if (below.empty() && above.empty()) return;
+  rebuild_quads(iy, std::min(below.first, above.first) - 1, std::max(below.last, above.last) + 1);
 }
 
 template <bool kAdd>
 TsdfChange TsdfGrid::apply_row(const TsdfObservation& o, float cos_yaw, float sin_yaw, int iy, int from_x, int to_x,
-                               const TsdfRing& part) {
+                               const TsdfRing& part, Rows* rows) {
   // Offsets are counted from the sensor's own cell, an absolute index: a cell's numbers do not depend on
   // where the window lies, so removal after scrolling repeats them to the bit.
   const int sensor_x = cell_of(o.T_map_sensor.x_m), sensor_y = cell_of(o.T_map_sensor.y_m);
@@ -321,17 +358,17 @@ TsdfChange TsdfGrid::apply_row(const TsdfObservation& o, float cos_yaw, float si
   if (o.pinhole) {
     p.column_scale = o.fx_px;
     p.column_shift = o.cx_px + 0.5f;
-    project_row_pinhole(p, from_x - sensor_x, count, row_column_.data(), row_distance_m_.data());
+    project_row_pinhole(p, from_x - sensor_x, count, rows->column.data(), rows->distance_m.data());
   } else {
     p.column_scale = 1.0f / o.angle_increment_rad;
     p.column_shift = 0.5f - o.angle_min_rad / o.angle_increment_rad;
-    project_row_angular(p, from_x - sensor_x, count, row_column_.data(), row_distance_m_.data(),
-                        row_angle_rad_.data());
+    project_row_angular(p, from_x - sensor_x, count, rows->column.data(), rows->distance_m.data(),
+                        rows->angle_rad.data());
   }
   if (!part.all()) {
     for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-      const float d = row_distance_m_[i];
-      row_column_[i] = d >= part.from_m && d < part.to_m ? row_column_[i] : -1;
+      const float d = rows->distance_m[i];
+      rows->column[i] = d >= part.from_m && d < part.to_m ? rows->column[i] : -1;
     }
   }
   TsdfChange all;
@@ -340,11 +377,11 @@ TsdfChange TsdfGrid::apply_row(const TsdfObservation& o, float cos_yaw, float si
     const std::size_t i = index(x, iy);
     const TsdfCells cells{&deficit_[i],     &weight_[i],         &standing_weight_[i], &reset_[i],
                           &last_seen_s_[i],  &contradictions_[i], &value_[i]};
-    const std::int32_t* const column = row_column_.data() + (x - from_x);
-    const float* const distance = row_distance_m_.data() + (x - from_x);
+    const std::int32_t* const column = rows->column.data() + (x - from_x);
+    const float* const distance = rows->distance_m.data() + (x - from_x);
     TsdfChange change;
     if constexpr (kAdd) {
-      change = add_to_cells(rules_, o, column, distance, piece, cells, &contradicted_);
+      change = add_to_cells(rules_, o, column, distance, piece, cells, &rows->contradicted);
     } else {
       change = remove_from_cells(rules_, o, column, distance, piece, cells);
     }

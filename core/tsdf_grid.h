@@ -24,6 +24,7 @@ struct TsdfConfig {
   double front_clear_range_m = 4.0;
   double appear_range_m = 1.2;
   double every_row_to_m = 8.0;
+  int threads = 1;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -52,6 +53,8 @@ struct TsdfConfig {
              "DepthProfile: up to here a frame is integrated in every row of cells, beyond it in every second one, beyond twice that in every "
              "fourth, in other ones with each frame: most cells lie far away, where one frame of thirty a second says little. 0 = in all "
              "(the paper's).");
+    v.integer("threads", threads, 1, 64, "",
+              "A frame is integrated, and taken out again, by so many threads; the same bytes with any number. build_map uses two at least.");
   }
   std::vector<std::string> validate() const { return {}; }
   /// The largest weight one observation adds to a cell, in integer units.
@@ -154,11 +157,25 @@ class TsdfGrid {
   std::uint64_t cells_reset_by_contradiction() const { return contradicted_; }
 
  private:
+  /// What is needed for some neighbouring rows of cells, one after the other.
+  struct Rows {
+    std::vector<std::int32_t> column;  ///< the observation's column of each cell of a row, or -1 ...
+    std::vector<float> distance_m;     ///< ... its distance from the sensor ...
+    std::vector<float> angle_rad;
+    TsdfChange first, last;  ///< of the first row and the last, in absolute cells
+    std::uint64_t contradicted = 0;
+  };
+
   template <bool kAdd>
   void apply(const TsdfObservation& observation, const TsdfRing& part);
+  /// Rows [low_y, high_y) and the quads between them.
+  template <bool kAdd>
+  void apply_rows(const TsdfObservation& observation, const TsdfRing& part, int low_y, int high_y, Rows* rows);
   double row_reach_m(const TsdfObservation& observation, int iy) const;
   template <bool kAdd>
-  TsdfChange apply_row(const TsdfObservation& observation, float cos_yaw, float sin_yaw, int iy, int from_x, int to_x, const TsdfRing& part);
+  TsdfChange apply_row(const TsdfObservation& observation, float cos_yaw, float sin_yaw, int iy, int from_x, int to_x, const TsdfRing& part,
+                       Rows* rows);
+  void rebuild_quads(int iy, const TsdfChange& below, const TsdfChange& above);
   void rebuild_quads(int iy, int from_x, int to_x);
   void reset_cell(int ix, int iy, std::uint32_t next_sequence);
 
@@ -174,10 +191,7 @@ class TsdfGrid {
   std::vector<std::int8_t> value_;
   std::vector<std::uint32_t> quad_;
   std::vector<std::uint8_t> contradictions_;
-  std::vector<std::int32_t>
-      row_column_;                     ///< scratch of one row: the observation's column of each cell, or -1
-  std::vector<float> row_distance_m_;  ///< ... and its distance from the sensor
-  std::vector<float> row_angle_rad_;
+  std::vector<Rows> rows_;  ///< scratch, for each thread's parts
   std::uint64_t contradicted_ = 0;
 };
 

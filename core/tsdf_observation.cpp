@@ -43,6 +43,27 @@ float sine_between(const TsdfObservation& o, std::size_t i, std::size_t k) {
   return std::fabs(o.direction_x[i] * o.direction_y[k] - o.direction_y[i] * o.direction_x[k]);
 }
 
+/// How many columns beside column `p`, up to `most`, have rays within `margin` of its own where that ends. They are neighbours, and
+/// of a view round about not even half of it: doubling finds where they end, halving where exactly.
+std::ptrdiff_t tube_columns(const TsdfObservation& o, std::ptrdiff_t p, std::ptrdiff_t step, std::ptrdiff_t most, float own, float margin) {
+  const auto i = static_cast<std::size_t>(p);
+  const auto within = [&](std::ptrdiff_t n) {
+    const auto k = static_cast<std::size_t>(p + n * step);
+    return o.direction_x[i] * o.direction_x[k] + o.direction_y[i] * o.direction_y[k] > 0.0f && own * sine_between(o, i, k) <= margin;
+  };
+  std::ptrdiff_t inside = 0, outside = 1;
+  while (outside <= most && within(outside)) {
+    inside = outside;
+    outside *= 2;
+  }
+  outside = std::min(outside, most + 1);
+  while (outside - inside > 1) {
+    const std::ptrdiff_t middle = inside + (outside - inside) / 2;
+    (within(middle) ? inside : outside) = middle;
+  }
+  return inside;
+}
+
 /// The tube of +-margin round each ray. A neighbour's answer at range r ends all tubes that it lies in.
 /// Beside a column without any answer nothing is sure until the rays are a margin apart, so that a dark pole
 /// between good columns is not carved away.
@@ -67,13 +88,10 @@ void set_clear(const ObservationLimits& limits, TsdfObservation* out) {
         out->clear_from_m[i] = std::max(out->clear_from_m[i], margin / std::max(sine, 1e-6f));
       }
       const float own = seen_to(*out, i);
-      for (std::ptrdiff_t q = p + step; q >= 0 && q < count; q += step) {
-        const auto k = static_cast<std::size_t>(q);
-        const float cosine =
-            out->direction_x[i] * out->direction_x[k] + out->direction_y[i] * out->direction_y[k];
-        if (cosine <= 0.0f || own * sine_between(*out, i, k) > margin) break;
-        out->clear_to_m[k] = std::min(out->clear_to_m[k], own);
-      }
+      const std::ptrdiff_t most = step > 0 ? count - 1 - p : p;  // columns that way
+      const std::ptrdiff_t within = tube_columns(*out, p, step, most, own, margin);
+      float* const clear_to_m = out->clear_to_m.data() + (step > 0 ? p + 1 : p - within);
+      for (std::ptrdiff_t k = 0; k < within; ++k) clear_to_m[k] = std::min(clear_to_m[k], own);
     }
   };
   pass(0, 1);

@@ -19,10 +19,12 @@
 namespace knav {
 namespace {
 
-TEST(TsdfGrid, PlainAndVectorCodeGiveTheSameBytes) {
+TEST(TsdfGrid, PlainAndVectorCodeAndSeveralThreadsGiveTheSameBytes) {
   TsdfConfig config;  // the defaults: weights that fall off behind surfaces
   config.every_row_to_m = 1.5;  // farther rows take turns
   TsdfGrid plain(config, 3.2, false), vectors(config, 3.2, true);
+  config.threads = 3;
+  TsdfGrid threads(config, 3.2, true);
   RandomStream random(11, random_stream::kTest, 3, 0);
   std::vector<TsdfObservation> held;
   double x = 0.0, y = 0.0;
@@ -42,31 +44,34 @@ TEST(TsdfGrid, PlainAndVectorCodeGiveTheSameBytes) {
     observation_from(profile, limits_of(config), &o);
     o.sequence = sequence;
     o.T_map_sensor = {x, y, random.uniform(-kPi, kPi)};
-    for (TsdfGrid* grid : {&plain, &vectors}) {
+    for (TsdfGrid* grid : {&plain, &vectors, &threads}) {
       grid->scroll_to(x, y, sequence);
       grid->add(o);
     }
     held.push_back(o);
     if (held.size() > 20) {
       const auto victim = held.begin() + static_cast<std::ptrdiff_t>(random.uniform() * 20);
-      for (TsdfGrid* grid : {&plain, &vectors}) grid->remove(*victim);
+      for (TsdfGrid* grid : {&plain, &vectors, &threads}) grid->remove(*victim);
       held.erase(victim);
     }
   }
   EXPECT_GT(plain.cells_reset_by_contradiction(), 100u);
   EXPECT_EQ(plain.cells_reset_by_contradiction(), vectors.cells_reset_by_contradiction());
+  EXPECT_EQ(plain.cells_reset_by_contradiction(), threads.cells_reset_by_contradiction());
   int different = 0, standing = 0;
   for (int iy = plain.first_y(); iy < plain.first_y() + plain.size_cells() - 1; ++iy) {
     for (int ix = plain.first_x(); ix < plain.first_x() + plain.size_cells() - 1; ++ix) {
-      different += plain.weighted_sum_units(ix, iy) != vectors.weighted_sum_units(ix, iy) ||
-                           plain.weight_units(ix, iy) != vectors.weight_units(ix, iy) ||
-                           plain.standing_weight_units(ix, iy) != vectors.standing_weight_units(ix, iy) ||
-                           plain.reset_sequence(ix, iy) != vectors.reset_sequence(ix, iy) ||
-                           plain.last_seen_s(ix, iy) != vectors.last_seen_s(ix, iy) ||
-                           plain.value(ix, iy) != vectors.value(ix, iy) ||
-                           plain.quads()[plain.quad_index(ix, iy)] != vectors.quads()[vectors.quad_index(ix, iy)]
-                       ? 1
-                       : 0;
+      for (const TsdfGrid* other : {&vectors, &threads}) {
+        different += plain.weighted_sum_units(ix, iy) != other->weighted_sum_units(ix, iy) ||
+                             plain.weight_units(ix, iy) != other->weight_units(ix, iy) ||
+                             plain.standing_weight_units(ix, iy) != other->standing_weight_units(ix, iy) ||
+                             plain.reset_sequence(ix, iy) != other->reset_sequence(ix, iy) ||
+                             plain.last_seen_s(ix, iy) != other->last_seen_s(ix, iy) ||
+                             plain.value(ix, iy) != other->value(ix, iy) ||
+                             plain.quads()[plain.quad_index(ix, iy)] != other->quads()[other->quad_index(ix, iy)]
+                         ? 1
+                         : 0;
+      }
       standing += plain.standing_weight_units(ix, iy) > 0 ? 1 : 0;
       // The quad is its four cells.
       const std::uint32_t quad = plain.quads()[plain.quad_index(ix, iy)];
