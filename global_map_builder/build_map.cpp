@@ -49,7 +49,7 @@ class Stages {
  public:
   void update(const char* stage, double fraction, const std::string& note = "") {
     stop_if_interrupted();
-    if (stage_ != stage) {
+    if (!bar_ || stage_ != stage) {
       if (bar_) bar_->update(1.0);
       bar_.reset();
       bar_ = std::make_unique<Progress>(std::string("build_map: ") + stage);

@@ -317,17 +317,18 @@ void ClosureFinder::pair_buttons(int drive, int lowest) {
 
 void ClosureFinder::search_from(int keyframe, int lowest) {
   const std::vector<int> visits = earlier_visits(keyframe, lowest);
+  const auto near = [&](int visit, const Pose2& prior) {
+    return distance_m(prior, {}) <= config_.closures.nearest_m + window_for(drift_path_m(visit, keyframe)).radius_m;
+  };
   std::vector<int> compared = {keyframe};
   for (const int visit : visits) {
     const Pose2 prior = graph_.nodes.at(visit).inverse() * graph_.nodes.at(keyframe);
-    if (!tried(visit, keyframe, prior)) compared.push_back(visit);
+    if (!tried(visit, keyframe, prior) && near(visit, prior)) compared.push_back(visit);
   }
   if (compared.size() > 1) prepare_submaps(compared);
   for (const int visit : visits) {
     const Pose2 prior = graph_.nodes.at(visit).inverse() * graph_.nodes.at(keyframe);
-    const double radius_m = window_for(drift_path_m(visit, keyframe)).radius_m;
-    if (distance_m(prior, {}) > config_.closures.nearest_m + radius_m || tried(visit, keyframe, prior))
-      continue;
+    if (tried(visit, keyframe, prior) || !near(visit, prior)) continue;
     const bool there = std::any_of(closures_.begin(), closures_.end(),
                                    [&](const Closure& c) { return c.from == visit && c.to == keyframe; });
     if (there) continue;

@@ -8,7 +8,7 @@
 namespace knav {
 namespace {
 
-constexpr int kThreads = 2;  // nothing else runs while a drive is mapped
+constexpr int kThreads = 2;  // of the mapper: build_map has the machine to itself
 constexpr double kBreakScale = 10.0;  // how much less a step is trusted when the mapper lost the thread
 
 bool moved(const Pose2& a, const Pose2& b, double distance, double angle_deg) {

@@ -231,5 +231,43 @@ TEST_F(Recording, BuildMapRefusesInOneSentenceAndWritesNothing) {
   EXPECT_NE(refusal_of_build_map(path()).find("reindex"), std::string::npos);
 }
 
+/// A drive of 1.5 m along the middle of a room [-3, 5] x [-low_y_m, 3] in the odometry's frame, which is the room's.
+void fill_room(rosbag::Bag& bag, double start_s, double start_x_m, double low_y_m) {
+  for (int i = 0; i <= 30; ++i) {
+    const double t = start_s + 0.1 * i, x_m = start_x_m + 0.05 * i;
+    bag.write("/odom", ros::Time(t), odometry_at(t, x_m));
+    sensor_msgs::LaserScan scan = scan_at(t - 0.02);
+    scan.angle_min = static_cast<float>(-kPi);
+    scan.angle_increment = static_cast<float>(kPi / 180.0);
+    scan.range_max = 20.0f;
+    scan.ranges.clear();
+    for (int ray = 0; ray < 360; ++ray) {
+      const double angle = -kPi + ray * kPi / 180.0, c = std::cos(angle), s = std::sin(angle);
+      const double to_x = c > 0.0 ? (5.0 - x_m) / c : (-3.0 - x_m) / std::min(c, -1e-9);
+      const double to_y = s > 0.0 ? 3.0 / s : -low_y_m / std::min(s, -1e-9);
+      scan.ranges.push_back(static_cast<float>(std::min(to_x, to_y)));
+    }
+    if (i > 0) bag.write("/scan", ros::Time(t), scan);
+  }
+}
+
+TEST_F(Recording, BuildMapPutsTheBagsOfOneDriveTogether) {
+  write([](rosbag::Bag& bag) { fill_room(bag, 10.0, 0.0, 2.0); });
+  fs::rename(path(), path("first.bag"));
+  write([](rosbag::Bag& bag) { fill_room(bag, 13.2, 1.5, 2.0); });
+  const std::string command = std::string(BUILD_MAP) + " " + path("first.bag") + " " + path() + " --out " + path("map") + " --json " +
+                              path("figures.json") + " 2> " + path("err");
+  ASSERT_EQ(WEXITSTATUS(std::system(command.c_str())), 0) << read_text_file(path("err"));
+  EXPECT_TRUE(fs::exists(path("map") + "/map.pgm"));
+  EXPECT_NE(read_text_file(path("figures.json")).find("\"drives\": 1"), std::string::npos);
+}
+
+TEST_F(Recording, BuildMapRefusesBagsOfDifferentBuildings) {
+  write([](rosbag::Bag& bag) { fill_room(bag, 10.0, 0.0, 2.0); });
+  fs::rename(path(), path("first.bag"));
+  write([](rosbag::Bag& bag) { fill_room(bag, 5000.0, -1.0, 9.0); });
+  EXPECT_NE(refusal_of_build_map(path("first.bag") + " " + path()).find("drive.bag"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace knav
