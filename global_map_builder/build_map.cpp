@@ -16,6 +16,7 @@
 #include "global_map_builder/closure_list.h"
 #include "global_map_builder/map_builder.h"
 #include "global_map_builder/map_writer.h"
+#include "global_map_builder/ordered_worker.h"
 #include "ros_common/command_line.h"
 
 namespace knav {
@@ -77,6 +78,8 @@ double peak_memory_mb() {
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
+constexpr std::size_t kReadAhead = 64;  // odometry, observations and marks that wait for the mapper
+
 struct Read {
   std::string source;
   std::size_t observations = 0, marks = 0;
@@ -112,8 +115,7 @@ Read read_bags(const Options& options, const ObservationReaderConfig& config, co
   for (std::size_t i = 0; i < options.bags.size(); ++i) {
     ObservationReader reader(options.bags[i], config, front_end);
     bool first = true;
-    ObservationCallbacks callbacks;
-    callbacks.add_odometry = [&](double stamp_s, const Pose2& T) {
+    const auto add_odometry = [&](double stamp_s, const Pose2& T) {
       if (first && !end.continued_by(stamp_s, T)) {
         builder->begin_drive(options.bags[i]);
         ++read.drives;
@@ -122,17 +124,22 @@ Read read_bags(const Options& options, const ObservationReaderConfig& config, co
       end.add(stamp_s, T);
       builder->add_odometry(stamp_s, T);
     };
-    callbacks.profile = [&](const DepthProfile& profile, const Pose2& T) { builder->add(profile, T); };
-    callbacks.scan = [&](const RangeScan& scan, const Pose2& T) { builder->add(scan, T); };
-    callbacks.mark = [&](double stamp_s) { builder->mark(stamp_s); };
-    callbacks.progress = [&](double fraction) {
+    const auto show_progress = [&](double fraction) {
       const Drive& drive = builder->drive();
       stages->update("trajectory",
                      (static_cast<double>(i) + fraction) / static_cast<double>(options.bags.size()),
                      fmt::format("{} frames, {:.0f} m", drive.trajectory.size(),
                                  drive.keyframes.empty() ? 0.0 : drive.keyframes.back().path_m));
     };
+    OrderedWorker mapping(kReadAhead);  // ends before what it refers to
+    ObservationCallbacks callbacks;
+    callbacks.add_odometry = [&](double stamp_s, const Pose2& T) { mapping.run([&, stamp_s, T] { add_odometry(stamp_s, T); }); };
+    callbacks.profile = [&](const DepthProfile& profile, const Pose2& T) { mapping.run([=] { builder->add(profile, T); }); };
+    callbacks.scan = [&](const RangeScan& scan, const Pose2& T) { mapping.run([=] { builder->add(scan, T); }); };
+    callbacks.mark = [&](double stamp_s) { mapping.run([=] { builder->mark(stamp_s); }); };
+    callbacks.progress = [&](double fraction) { mapping.run([&, fraction] { show_progress(fraction); }); };
     reader.read(callbacks);
+    mapping.finish();
     stages->finish();
     for (const std::string& warning : reader.warnings()) fmt::print(stderr, "build_map: {}\n", warning);
     const auto& statistics = reader.statistics();
