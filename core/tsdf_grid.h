@@ -54,7 +54,7 @@ struct TsdfConfig {
              "fourth, in other ones with each frame: most cells lie far away, where one frame of thirty a second says little. 0 = in all "
              "(the paper's).");
     v.integer("threads", threads, 1, 64, "",
-              "A frame is integrated, and taken out again, by so many threads; the same bytes with any number. build_map uses two at least.");
+              "A frame is integrated, and taken out again, by so many threads; the same bytes with any number. While mapping see map_builder/drive/mapper_threads.");
   }
   std::vector<std::string> validate() const { return {}; }
   /// The largest weight one observation adds to a cell, in integer units.

@@ -8,7 +8,6 @@
 namespace knav {
 namespace {
 
-constexpr int kThreads = 2;  // of the mapper: build_map has the machine to itself
 constexpr double kBreakScale = 10.0;  // how much less a step is trusted when the mapper lost the thread
 
 bool moved(const Pose2& a, const Pose2& b, double distance, double angle_deg) {
@@ -30,7 +29,7 @@ Eigen::Matrix3d step_covariance(const DriveConfig& config, double path_m, double
 LocalMapperConfig for_mapping(LocalMapperConfig mapper, const DriveConfig& config, bool scan) {
   mapper.range_errors.learn = false;
   mapper.filter.thin_rows = 0;
-  mapper.tsdf.threads = std::max(mapper.tsdf.threads, kThreads);
+  mapper.tsdf.threads = std::max(mapper.tsdf.threads, config.mapper_threads);
   if (scan) mapper.odometry_timing.stamp_sd_s = std::max(mapper.odometry_timing.stamp_sd_s, config.scan_stamp_sd_s);
   return mapper;
 }

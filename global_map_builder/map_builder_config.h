@@ -19,6 +19,7 @@ struct DriveConfig {
   double scan_keyframe_distance_m = 0.1;
   double scan_keyframe_angle_deg = 4.0;
   double scan_stamp_sd_s = 0.03;
+  int mapper_threads = 2;
   double position_sd_per_m = 0.02;
   double position_sd_floor_m = 0.0025;
   double heading_sd_deg_per_m = 0.4;
@@ -39,6 +40,8 @@ struct DriveConfig {
     v.number("scan_keyframe_angle_deg", scan_keyframe_angle_deg, 1, 180, "deg", "... or this turn.");
     v.number("scan_stamp_sd_s", scan_stamp_sd_s, 0, 1, "s",
              "local_mapper/odometry_timing/stamp_sd_s of a drive recorded with a scanner, unless that is more.");
+    v.integer("mapper_threads", mapper_threads, 1, 64, "",
+              "local_mapper/tsdf/threads while a drive is mapped, unless that is more.");
     v.number("position_sd_per_m", position_sd_per_m, 1e-4, 1, "m/m",
              "Position error (sd) of the local mapper per distance, of one metre; grows as the root of the "
              "distance.");

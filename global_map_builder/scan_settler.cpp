@@ -28,16 +28,20 @@ class Settler {
       views_.emplace_back(views, drive, static_cast<int>(k));
       poses_.push_back(drive.keyframes[k].T_drive_base);
     }
+    moved_.assign(poses_.size(), 0);
   }
 
-  /// All keyframes, each against the others where they were before. @return the number that moved
-  int pass() {
+  /// All keyframes, each against the others where they were before. @return whether any moved
+  bool pass() {
     std::vector<Pose2> settled = poses_;
     std::vector<char> moved(poses_.size(), 0);
     tbb::parallel_for(std::size_t{0}, poses_.size(), [&](std::size_t k) { moved[k] = settle(k, &settled[k]) ? 1 : 0; });
     poses_.swap(settled);
-    return static_cast<int>(std::count(moved.begin(), moved.end(), 1));
+    for (std::size_t k = 0; k < moved.size(); ++k) moved_[k] = moved_[k] != 0 || moved[k] != 0 ? 1 : 0;
+    return std::count(moved.begin(), moved.end(), 1) > 0;
   }
+  /// Of the keyframes, each counted once.
+  int moved() const { return static_cast<int>(std::count(moved_.begin(), moved_.end(), 1)); }
   const std::vector<Pose2>& poses() const { return poses_; }
 
  private:
@@ -111,6 +115,7 @@ class Settler {
   const Drive& drive_;
   std::vector<DriveView> views_;
   std::vector<Pose2> poses_;
+  std::vector<char> moved_;  ///< in any pass
 };
 
 }  // namespace
@@ -119,13 +124,11 @@ int settle_scans(const SettlingConfig& config, const JointRefinementConfig& view
                  const std::function<void(double)>& progress) {
   if (!config.enabled || drive->keyframes.size() < 2 || !std::holds_alternative<RangeScan>(drive->frames.front().data)) return 0;
   Settler settler(config, views, *drive);
-  int settled = 0;
   for (int pass = 0; pass < config.passes; ++pass) {
     progress(static_cast<double>(pass) / config.passes);
-    const int moved = settler.pass();
-    settled += moved;
-    if (moved == 0) break;
+    if (!settler.pass()) break;
   }
+  const int settled = settler.moved();
   if (settled > 0) drive->adjust(settler.poses(), std::vector<Eigen::Matrix3d>(drive->edges.size(), Eigen::Matrix3d::Zero()));
   return settled;
 }

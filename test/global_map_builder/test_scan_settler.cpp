@@ -42,7 +42,7 @@ TEST(ScanSettler, SetsRightTheKeyframesThatStandTurned) {
   // One by 6 degrees, two in a row by 25 and 20: what late odometry does to a robot that turns.
   const auto turned = [](double deg) { return Pose2{0.0, 0.0, deg * kPi / 180.0}; };
   Drive drive = scanned_drive({{12, turned(6.0)}, {25, turned(-25.0)}, {26, turned(-20.0)}});
-  EXPECT_GE(settle_scans({}, {}, &drive, [](double) {}), 3);
+  EXPECT_EQ(settle_scans({}, {}, &drive, [](double) {}), 3) << "each counted once, whatever the passes";
   for (const std::size_t k : {12u, 25u, 26u}) {
     // 361 rays of 8 mm over walls of metres tell a heading to hundredths of a degree; the gate is the search's step.
     EXPECT_LT(heading_error_deg(drive, k), 0.5) << "keyframe " << k;
