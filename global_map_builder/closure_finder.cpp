@@ -242,6 +242,7 @@ bool ClosureFinder::join(Closure closure, const PoseGraphEdge& edge) {
   GraphOptimizerConfig plain = config_.graph;
   plain.robust_loss = "none";
   plain.initialization = "given";
+  plain.warm_start = true;
   optimize(plain, &trial);
   closure.chi2 = chi2(trial) - chi2(graph_);
   closure.accepted = closure.chi2 < config_.closures.max_innovation;

@@ -92,6 +92,7 @@ void project_angular(const RowProjection& p, int count, std::int32_t* column, fl
 ObservationLimits SurfaceConfig::limits() const {
   ObservationLimits limits;
   limits.range_max_m = range_max_m;
+  limits.clear_margin_m = 0.0;  // what finds clear tubes is a fifth of an observation's work, and nothing here asks for them
   limits.truncation.base_m = limits.truncation.scan_base_m = front_m;
   limits.truncation.per_range_squared = per_range_squared;
   limits.truncation.limit_m = 10.0;

@@ -43,10 +43,16 @@ DriveView::DriveView(const JointRefinementConfig& config, const Drive& drive, in
     nearest = after - 1;
   }
   if (std::fabs(nearest->stamp_s - k.stamp_s) > kNearFrame_s) return;
-  T_keyframe_sensor_ = k.T_drive_base.inverse() * nearest->T_drive_base * nearest->T_base_sensor;
+  set_sensor(k.T_drive_base.inverse() * nearest->T_drive_base * nearest->T_base_sensor);
   std::visit([&](const auto& data) { fill(data); }, nearest->data);
   if (pinhole_) average(config, drive.frames, static_cast<std::size_t>(nearest - drive.frames.begin()));
   place({});
+}
+
+void DriveView::set_sensor(const Pose2& T_keyframe_sensor) {
+  T_keyframe_sensor_ = T_keyframe_sensor;
+  const double c = std::cos(T_keyframe_sensor.yaw_rad), s = std::sin(T_keyframe_sensor.yaw_rad);
+  R_sensor_keyframe_ << c, s, -s, c;
 }
 
 void DriveView::fill(const DepthProfile& profile) {
@@ -217,10 +223,6 @@ void DriveView::find_normal(std::size_t i, int reach_bins) {
   p.normal = normal;
   p.on_line = p.position + mean.dot(normal) * normal;
   p.straight = true;
-}
-
-int DriveView::bin_of(const Eigen::Vector2d& point) const {
-  return bin_at(T_keyframe_sensor_.inverse() * Point2{point.x(), point.y()});
 }
 
 int DriveView::bin_at(const Point2& at) const {

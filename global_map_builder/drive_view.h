@@ -39,7 +39,10 @@ class DriveView {
   /// Points and normals with this offset taken out.
   void place(const RangeOffset& offset);
   /// The bin that looks at a point of the keyframe's frame, -1 if none does.
-  int bin_of(const Eigen::Vector2d& point) const;
+  int bin_of(const Eigen::Vector2d& point) const {
+    const Eigen::Vector2d in_sensor = R_sensor_keyframe_ * (point - eye());
+    return bin_at({in_sensor.x(), in_sensor.y()});
+  }
 
  private:
   DriveView() = default;
@@ -50,7 +53,10 @@ class DriveView {
   void find_normals();
   void find_normal(std::size_t point, int reach_bins);
 
+  void set_sensor(const Pose2& T_keyframe_sensor);
+
   Pose2 T_keyframe_sensor_;
+  Eigen::Matrix2d R_sensor_keyframe_ = Eigen::Matrix2d::Identity();  ///< its turn, taken once: bin_of is asked millions of times
   bool pinhole_ = true;
   double fx_px_ = 1.0, cx_px_ = 0.0, angle_min_rad_ = 0.0, angle_increment_rad_ = 1.0;
   double bin_columns_ = 1.0;

@@ -100,6 +100,10 @@ Outcome solve(const GraphOptimizerConfig& config, PoseGraph* graph) {
   options.max_num_iterations = config.max_iterations;
   options.function_tolerance = 1e-9;
   options.num_threads = 1;
+  if (config.warm_start) {
+    options.function_tolerance = 1e-6;
+    options.initial_trust_region_radius = options.max_trust_region_radius;
+  }
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);

@@ -12,6 +12,9 @@ struct GraphOptimizerConfig {
   std::string robust_loss = "dcs";
   double robust_scale = 3.0;
   int max_iterations = 100;
+  /// Not a parameter: the poses given are the optimum but for a newest edge. Full steps of Gauss-Newton from the first on, to 1e-6 of
+  /// the cost: Levenberg-Marquardt's damping is worth thousands of times what a long drive's steps hold it with.
+  bool warm_start = false;
 
   template <class Visitor>
   void visit(Visitor& v) {

@@ -1,6 +1,7 @@
 #include "global_map_builder/map_writer.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_invoke.h>
 
 #include <cmath>
 #include <utility>
@@ -137,9 +138,11 @@ void write_built_map(const std::string& directory, const Json& figures, bool for
     if (built->old_drives > 0) {
       write_text_atomically(folder + "/changes.json", changes_json(built->changes).dump(1) + "\n");
     }
-    write_map_picture(folder + "/map.png", *built);
-    write_map_record(folder + "/drives.bin", built->record);
-    write_map_report(folder + "/report.html", *built, "Map of " + names, report_figures(figures));
+    const auto write_pictures = [&] {
+      write_map_picture(folder + "/map.png", *built);
+      write_map_report(folder + "/report.html", *built, "Map of " + names, report_figures(figures));
+    };
+    tbb::parallel_invoke(write_pictures, [&] { write_map_record(folder + "/drives.bin", built->record); });
   });
 }
 
