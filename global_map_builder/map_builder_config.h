@@ -80,8 +80,8 @@ struct ClosureConfig {
   int locate_agreeing = 3;
   double allowed_sd_m = 0.05;
   double allowed_sd_deg = 0.5;
-  double fitted_max_m = 0.5;
-  double fitted_max_deg = 5.0;
+  double fitted_max_m = 0.4;
+  double fitted_max_deg = 3.0;
   double falsify_share = 0.0;
   int falsify_seed = 1;
   MatchConfig match;

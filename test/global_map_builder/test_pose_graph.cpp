@@ -71,6 +71,26 @@ TEST(PoseGraph, OptimisationKeepsTheLowestNodeOfEveryPart) {
   EXPECT_NEAR(graph.nodes.at(101).x_m, 7.0 + std::cos(1.0), 1e-6);
 }
 
+/// A straight chain, at its optimum without error, and one more edge that says it is longer: in standard deviations of chain and edge
+/// together the growth of chi2, worked out by hand, is (1 m)^2 / (401 (0.05 m)^2).
+TEST(PoseGraph, FromAnOptimumANewEdgesInnovationIsFoundInFewFullSteps) {
+  constexpr int kSteps = 400;
+  PoseGraph graph;
+  for (int i = 0; i <= kSteps; ++i) {
+    graph.nodes[i] = {1.0 * i, 0.0, 0.0};
+    if (i > 0) graph.edges.push_back(edge(i - 1, i, {1.0, 0.0, 0.0}));
+  }
+  graph.edges.push_back(edge(0, kSteps, {kSteps + 1.0, 0.0, 0.0}));
+  GraphOptimizerConfig config;
+  config.initialization = "given";
+  config.robust_loss = "none";
+  config.warm_start = true;
+  const GraphOptimizerSummary summary = optimize(config, &graph);
+  EXPECT_NEAR(summary.final_chi2, 1.0 / (401.0 * 0.05 * 0.05), 1e-5);
+  EXPECT_LE(summary.iterations, 3);
+  EXPECT_NEAR(graph.nodes.at(kSteps).x_m, kSteps * (1.0 + 1.0 / 401.0), 1e-4);
+}
+
 TEST(PoseGraph, FalseClosuresFadeOut) {
   const PoseGraph truth = square_loop();
   for (const char* loss : {"dcs", "cauchy"}) {
