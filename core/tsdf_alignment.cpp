@@ -5,6 +5,7 @@
 
 #include "core/fast_math.h"
 #include "core/multiversion.h"
+#include "core/parts.h"
 
 #ifdef KNAV_HAVE_AVX2_CODE
 #include <immintrin.h>
@@ -137,7 +138,7 @@ float sum_of_costs(const Window& window, const ScaledPose& pose, const WeightedP
 }  // namespace
 
 void tsdf_alignment_costs(const TsdfGrid& grid, const WeightedPoints& points, const ParticleSet& particles,
-                          float unknown_price, std::vector<float>* cost, bool vectors) {
+                          float unknown_price, std::vector<float>* cost, int threads, bool vectors) {
   cost->resize(particles.size());
   float weight_sum = 0.0f, reach_m = 0.0f;
   for (std::size_t k = 0; k < points.size(); ++k) {
@@ -162,14 +163,17 @@ void tsdf_alignment_costs(const TsdfGrid& grid, const WeightedPoints& points, co
   sine.resize(particles.size());
   cos_sin(particles.yaw_rad.data(), particles.size(), cosine.data(), sine.data());
   const bool use_vectors = vectors && cpu_has_avx2();
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    ScaledPose pose;
-    pose.x0 = static_cast<float>((particles.x_m[i] * scale - 0.5 - grid.first_x()) * kSubcells);
-    pose.y0 = static_cast<float>((particles.y_m[i] * scale - 0.5 - grid.first_y()) * kSubcells);
-    pose.c = static_cast<float>(cosine[i] * scale * kSubcells);
-    pose.s = static_cast<float>(sine[i] * scale * kSubcells);
-    (*cost)[i] = sum_of_costs(window, pose, points, reach, use_vectors) * to_mean;
-  }
+  const double *const cosines = cosine.data(), *const sines = sine.data();  // this thread's
+  in_parts(particles.size(), threads, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      ScaledPose pose;
+      pose.x0 = static_cast<float>((particles.x_m[i] * scale - 0.5 - grid.first_x()) * kSubcells);
+      pose.y0 = static_cast<float>((particles.y_m[i] * scale - 0.5 - grid.first_y()) * kSubcells);
+      pose.c = static_cast<float>(cosines[i] * scale * kSubcells);
+      pose.s = static_cast<float>(sines[i] * scale * kSubcells);
+      (*cost)[i] = sum_of_costs(window, pose, points, reach, use_vectors) * to_mean;
+    }
+  });
 }
 
 void weigh_by_known_share(const TsdfGrid& grid, const ParticleSet& particles, int hypotheses,

@@ -30,6 +30,7 @@ LocalMapperConfig for_mapping(LocalMapperConfig mapper, const DriveConfig& confi
   mapper.range_errors.learn = false;
   mapper.filter.thin_rows = 0;
   mapper.tsdf.threads = std::max(mapper.tsdf.threads, config.mapper_threads);
+  mapper.filter.threads = std::max(mapper.filter.threads, config.mapper_threads);
   if (scan) mapper.odometry_timing.stamp_sd_s = std::max(mapper.odometry_timing.stamp_sd_s, config.scan_stamp_sd_s);
   return mapper;
 }

@@ -18,6 +18,7 @@ namespace knav {
 /// The particle filter over the robot's pose (paper section III.E).
 struct FilterConfig {
   int particles = 2000;
+  int threads = 1;
   int readings = 120;
   std::string alignment_cost = "normalized";
   double temperature = 0.0003;
@@ -33,6 +34,8 @@ struct FilterConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v.integer("particles", particles, 10, 200000, "", "Pose hypotheses.");
+    v.integer("threads", threads, 1, 64, "",
+              "They are moved and compared with the map by so many threads; the same bytes with any number. While mapping see map_builder/drive/mapper_threads.");
     v.integer("readings", readings, 8, 4000, "",
               "Readings of a frame that are compared with the map, at most.");
     v.choice("alignment_cost", alignment_cost, {"paper", "normalized"},

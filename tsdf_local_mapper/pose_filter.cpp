@@ -49,7 +49,7 @@ void PoseFilter::predict(const Pose2& T_before_after, double dt_s) {
   if (!odometry_errors_.on()) {
     sample_motion(motion_, T_before_after, seed_, random_stream::kMotion, step_++, particles_);
   } else {
-    odometry_errors_.move(T_before_after, motion_noise(motion_, T_before_after), seed_, step_, &particles_);
+    odometry_errors_.move(T_before_after, motion_noise(motion_, T_before_after), seed_, step_, config_.threads, &particles_);
     step_ += 2;
   }
   if (timed) timing_.add(T_before_after, dt_s, seed_, step, &particles_);
@@ -85,7 +85,7 @@ void PoseFilter::weigh(const TsdfGrid& grid, const WeightedPoints& points, doubl
       cost /= std::max(1e-6f, mean_weight) * static_cast<float>(std::max<std::size_t>(1, points.size()));
     }
   } else {
-    tsdf_alignment_costs(grid, points, particles_, static_cast<float>(config_.unknown_price), &cost_);
+    tsdf_alignment_costs(grid, points, particles_, static_cast<float>(config_.unknown_price), &cost_, config_.threads);
     weigh_by_cost(particles_, cost_, temperature() / share);
   }
 }

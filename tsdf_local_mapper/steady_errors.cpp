@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "core/fast_math.h"
+#include "core/parts.h"
 #include "core/random.h"
 
 namespace knav {
@@ -34,7 +35,7 @@ void SteadyErrors::age(double moved_m) {
   turn_covariance_(1, 1) += fresh * config_.turn_scale_sd * config_.turn_scale_sd;
 }
 
-void SteadyErrors::move(const Pose2& T, const MotionNoise& noise, std::uint64_t seed, std::uint64_t step,
+void SteadyErrors::move(const Pose2& T, const MotionNoise& noise, std::uint64_t seed, std::uint64_t step, int threads,
                         ParticleSet* particles) {
   const std::size_t count = particles->size();
   const double distance = std::hypot(T.x_m, T.y_m);
@@ -55,21 +56,23 @@ void SteadyErrors::move(const Pose2& T, const MotionNoise& noise, std::uint64_t 
   cosine_.resize(count);
   sine_.resize(count);
   cos_sin(particles->yaw_rad.data(), count, cosine_.data(), sine_.data());
-  for (std::size_t i = 0; i < count; ++i) {
-    double white[3], steady[3];
-    three_normals(seed, random_stream::kMotion, step, static_cast<std::uint32_t>(i), white);
-    three_normals(seed, random_stream::kMotion, step + 1, static_cast<std::uint32_t>(i), steady);
-    const double lengthened = scale_sd * steady[0];
-    const double ex = lengthened * ux + noise.forward_m * white[0], ey = lengthened * uy + noise.sideways_m * white[1];
-    const double turned = steady_turn_sd * steady[1] + noise.turn_rad * white[2];
-    const double x = T.x_m * (1.0 + distance_scale_[i]) + ex, y = T.y_m * (1.0 + distance_scale_[i]) + ey;
-    const double yaw = particles->yaw_rad[i] + T.yaw_rad * (1.0 + turn_scale_[i]) + T.x_m * turn_per_m_[i] + turned;
-    particles->set(i, {particles->x_m[i] + cosine_[i] * x - sine_[i] * y,
-                       particles->y_m[i] + sine_[i] * x + cosine_[i] * y, yaw - 2.0 * kPi * rounded(yaw / (2.0 * kPi))});
-    distance_scale_[i] += scale_gain * (ex * ux + ey * uy);
-    turn_per_m_[i] += turn_gain[0] * turned;
-    turn_scale_[i] += turn_gain[1] * turned;
-  }
+  in_parts(count, threads, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      double white[3], steady[3];
+      three_normals(seed, random_stream::kMotion, step, static_cast<std::uint32_t>(i), white);
+      three_normals(seed, random_stream::kMotion, step + 1, static_cast<std::uint32_t>(i), steady);
+      const double lengthened = scale_sd * steady[0];
+      const double ex = lengthened * ux + noise.forward_m * white[0], ey = lengthened * uy + noise.sideways_m * white[1];
+      const double turned = steady_turn_sd * steady[1] + noise.turn_rad * white[2];
+      const double x = T.x_m * (1.0 + distance_scale_[i]) + ex, y = T.y_m * (1.0 + distance_scale_[i]) + ey;
+      const double yaw = particles->yaw_rad[i] + T.yaw_rad * (1.0 + turn_scale_[i]) + T.x_m * turn_per_m_[i] + turned;
+      particles->set(i, {particles->x_m[i] + cosine_[i] * x - sine_[i] * y,
+                         particles->y_m[i] + sine_[i] * x + cosine_[i] * y, yaw - 2.0 * kPi * rounded(yaw / (2.0 * kPi))});
+      distance_scale_[i] += scale_gain * (ex * ux + ey * uy);
+      turn_per_m_[i] += turn_gain[0] * turned;
+      turn_scale_[i] += turn_gain[1] * turned;
+    }
+  });
   distance_variance_ -= scale_gain * distance * distance_variance_;
   turn_covariance_ -= turn_gain * ph.transpose();
   turn_covariance_ = (0.5 * (turn_covariance_ + turn_covariance_.transpose())).eval();

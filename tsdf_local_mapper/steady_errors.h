@@ -41,8 +41,9 @@ class SteadyErrors {
   /// As if nothing were known of them.
   void forget(std::size_t particles);
   /// Moves each particle by odometry's step, by the noise, and by a sample of what is steadily wrong; each then knows more
-  /// of the errors. Particle i draws from index i of the stream kMotion, step and step + 1.
-  void move(const Pose2& T_before_after, const MotionNoise& noise, std::uint64_t seed, std::uint64_t step,
+  /// of the errors. Particle i draws from index i of the stream kMotion, step and step + 1: the same bytes with any number
+  /// of threads.
+  void move(const Pose2& T_before_after, const MotionNoise& noise, std::uint64_t seed, std::uint64_t step, int threads,
             ParticleSet* particles);
   /// Follows a resampling. @param parent  each new particle's old index
   void resample(const std::vector<std::uint32_t>& parent);

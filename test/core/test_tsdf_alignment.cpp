@@ -75,7 +75,7 @@ TEST_F(AlignmentTest, AgreesWithTheWrittenOutSum) {
   EXPECT_LT(std::fabs(bias), 1e-4);
 }
 
-TEST_F(AlignmentTest, PlainAndVectorCodeGiveTheSameBytes) {
+TEST_F(AlignmentTest, PlainCodeVectorsAndThreadsGiveTheSameBytes) {
   RandomStream random(3, random_stream::kTest, 6, 0);
   ParticleSet particles;
   particles.resize(500);
@@ -83,10 +83,12 @@ TEST_F(AlignmentTest, PlainAndVectorCodeGiveTheSameBytes) {
     const double spread_m = i % 5 == 0 ? 40.0 : 0.6;
     particles.set(i, {random.uniform(-spread_m, spread_m), random.uniform(-spread_m, spread_m), random.uniform(-4, 4)});
   }
-  std::vector<float> plain, vectors;
-  tsdf_alignment_costs(grid_, points_, particles, 0.6f, &plain, false);
-  tsdf_alignment_costs(grid_, points_, particles, 0.6f, &vectors, true);
+  std::vector<float> plain, vectors, threads;
+  tsdf_alignment_costs(grid_, points_, particles, 0.6f, &plain, 1, false);
+  tsdf_alignment_costs(grid_, points_, particles, 0.6f, &vectors, 1, true);
+  tsdf_alignment_costs(grid_, points_, particles, 0.6f, &threads, 3);
   EXPECT_EQ(plain, vectors);
+  EXPECT_EQ(plain, threads);
 }
 
 TEST_F(AlignmentTest, WhatComesNewlyIntoViewHasNoSay) {

@@ -24,10 +24,11 @@ TEST_F(LocalMapperTest, KeepsItsPlaceWithBadOdometry) {
   EXPECT_LT(mapper_->result().particle_lifespan_s, 10.0);
 }
 
-TEST_F(LocalMapperTest, SameInputAndSeedGiveTheSameBytes) {
-  std::vector<double> poses[2];
-  std::vector<float> scans[2];
-  for (int run = 0; run < 2; ++run) {
+TEST_F(LocalMapperTest, SameInputAndSeedGiveTheSameBytesOnOneThreadAndOnThree) {
+  std::vector<double> poses[3];
+  std::vector<float> scans[3];
+  for (int run = 0; run < 3; ++run) {
+    if (run == 2) config_.tsdf.threads = config_.filter.threads = 3;
     robot_ = DrivenRobot();
     stamp_s_ = 100.0;
     start();
@@ -42,6 +43,8 @@ TEST_F(LocalMapperTest, SameInputAndSeedGiveTheSameBytes) {
   }
   EXPECT_EQ(poses[0], poses[1]);
   EXPECT_EQ(scans[0], scans[1]);
+  EXPECT_EQ(poses[0], poses[2]);
+  EXPECT_EQ(scans[0], scans[2]);
 }
 
 TEST_F(LocalMapperTest, TheVirtualScanShowsTheRoomAllRound) {

@@ -24,7 +24,7 @@ ParticleSet at_origin() {
 
 void drive(double distance_m, const MotionNoise& noise, std::uint64_t* step, SteadyErrors* errors, ParticleSet* particles) {
   for (int k = 0; k < std::lround(distance_m / kStep_m); ++k, *step += 2) {
-    errors->move({kStep_m, 0.0, 0.0}, noise, kSeed, *step, particles);
+    errors->move({kStep_m, 0.0, 0.0}, noise, kSeed, *step, 1, particles);
   }
 }
 
@@ -111,7 +111,7 @@ TEST(SteadyErrors, TurnsAreToldFromTurningWhileDriving) {
   const MotionNoise noise{0.0005, 0.0005, 0.002};
   std::vector<std::uint32_t> parent(kParticles);
   const auto step_and_look = [&](const Pose2& odometry, double true_turn_rad) {
-    errors.move(odometry, noise, kSeed, step, &particles);
+    errors.move(odometry, noise, kSeed, step, 1, &particles);
     step += 2;
     std::size_t best = 0;
     const auto off = [&](std::size_t i) { return std::fabs(particles.yaw_rad[i] - true_turn_rad); };
