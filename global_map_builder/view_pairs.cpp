@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace knav {
@@ -42,6 +43,41 @@ const ViewPoint* partner(const DriveView& from, const ViewPoint& p, const Relati
     return nullptr;
   return &s;
 }
+
+/// Sums what points with the same knots add, ten rows and columns of the twenty-four. Neighbours mostly have the same.
+class PairSum {
+ public:
+  explicit PairSum(PairEquations* out) : out_(out) {}
+
+  /// @param J  of the two poses (six), from's two knots, to's two
+  void add(int from_knot, int to_knot, const Eigen::Matrix<double, 10, 1>& J, double w, double off) {
+    if (from_knot != from_knot_ || to_knot != to_knot_) {
+      flush();
+      from_knot_ = from_knot;
+      to_knot_ = to_knot;
+    }
+    H_.noalias() += (w * J) * J.transpose();
+    g_.noalias() += (w * off) * J;
+  }
+
+  /// Before the sums are read.
+  void flush() {
+    if (from_knot_ >= 0) {
+      const int from = PairEquations::kOffset + from_knot_, to = PairEquations::kOffset + RangeOffset::kKnots + to_knot_;
+      const std::array<int, 10> at{0, 1, 2, 3, 4, 5, from, from + 1, to, to + 1};
+      out_->H(at, at) += H_;
+      out_->g(at) += g_;
+    }
+    H_.setZero();
+    g_.setZero();
+  }
+
+ private:
+  PairEquations* out_;
+  int from_knot_ = -1, to_knot_ = -1;
+  Eigen::Matrix<double, 10, 10> H_ = Eigen::Matrix<double, 10, 10>::Zero();
+  Eigen::Matrix<double, 10, 1> g_ = Eigen::Matrix<double, 10, 1>::Zero();
+};
 
 double shared_part(const DriveView& from, const DriveView& to, const Relative& T_from_to) {
   const std::size_t count = to.points().size(), stride = std::max<std::size_t>(1, count / kProbes);
@@ -93,8 +129,8 @@ void compare_views(const DriveView& from, const DriveView& to, const Pose2& T_ma
   const Relative T_from_to(T_map_from.inverse() * T_map_to), A(T_map_from), B(T_map_to);
   const Eigen::Vector2d to_from(T_map_from.x_m, T_map_from.y_m), to_to(T_map_to.x_m, T_map_to.y_m);
   Eigen::Vector2d q;
-  Eigen::Matrix<double, PairEquations::kSize, 1> J;
   double comparable = 0.0, agreeing = 0.0;
+  PairSum sum(out);
   for (const ViewPoint& p : to.points()) {
     if (!p.straight) continue;
     bool hidden = false;
@@ -110,19 +146,14 @@ void compare_views(const DriveView& from, const DriveView& to, const Pose2& T_ma
     ++out->points;
     const Eigen::Vector2d n = A.R * s->normal, at = B.t + B.R * p.on_line;
     const Eigen::Vector2d a = at - to_from, b = at - to_to;
-    J.setZero();
-    J.head<6>() << -n.x(), -n.y(), n.x() * a.y() - n.y() * a.x(), n.x(), n.y(), -n.x() * b.y() + n.y() * b.x();
     const RangeOffset::Place ps = RangeOffset::place(s->column_share), pp = RangeOffset::place(p.column_share);
     const double ds = -n.dot(A.R * s->per_offset), dp = n.dot(B.R * p.per_offset);
-    J(PairEquations::kOffset + ps.first) += (1.0 - ps.share) * ds;
-    J(PairEquations::kOffset + ps.first + 1) += ps.share * ds;
-    const int second = PairEquations::kOffset + RangeOffset::kKnots;
-    J(second + pp.first) += (1.0 - pp.share) * dp;
-    J(second + pp.first + 1) += pp.share * dp;
-    const double w = fade / variance;
-    out->H.noalias() += (w * J) * J.transpose();
-    out->g.noalias() += (w * off) * J;
+    Eigen::Matrix<double, 10, 1> J;
+    J << -n.x(), -n.y(), n.x() * a.y() - n.y() * a.x(), n.x(), n.y(), -n.x() * b.y() + n.y() * b.x(), (1.0 - ps.share) * ds,
+        ps.share * ds, (1.0 - pp.share) * dp, pp.share * dp;
+    sum.add(ps.first, pp.first, J, fade / variance, off);
   }
+  sum.flush();
   // Views that contradict each other as much as they agree are of different things.
   const double share = comparable > 0.0 ? agreeing / comparable : 0.0;
   const double trust = std::clamp((share - kMinAgreeing) / (1.0 - kMinAgreeing), 0.0, 1.0);
