@@ -41,7 +41,7 @@ struct DriveConfig {
     v.number("scan_stamp_sd_s", scan_stamp_sd_s, 0, 1, "s",
              "local_mapper/odometry_timing/stamp_sd_s of a drive recorded with a scanner, unless that is more.");
     v.integer("mapper_threads", mapper_threads, 1, 64, "",
-              "local_mapper/tsdf/threads while a drive is mapped, unless that is more.");
+              "local_mapper/tsdf/threads and filter/threads while a drive is mapped, unless they are more.");
     v.number("position_sd_per_m", position_sd_per_m, 1e-4, 1, "m/m",
              "Position error (sd) of the local mapper per distance, of one metre; grows as the root of the "
              "distance.");
