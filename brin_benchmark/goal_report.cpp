@@ -24,6 +24,7 @@ nlohmann::json to_json(const GoalResult& r) {
           {"reason", r.reason},
           {"reason_off_m", r.reason_off_m},
           {"time_s", r.time_s},
+          {"came_near_s", r.came_near_s},
           {"distance_m", r.distance_m},
           {"standing_s", r.standing_s},
           {"localization", to_json(r.localization)},
@@ -49,6 +50,7 @@ GoalResult goal_from_json(const nlohmann::json& json, const std::string& file) {
   r.reason = json.at("reason");
   r.reason_off_m = json.at("reason_off_m");
   r.time_s = json.at("time_s");
+  r.came_near_s = json.value("came_near_s", -1.0);
   r.distance_m = json.at("distance_m");
   r.standing_s = json.at("standing_s");
   r.localization = honesty_from_json(json.at("localization"));
@@ -110,6 +112,7 @@ GoalScore score(const std::vector<GoalRunResult>& runs) {
         s.right += r.right() ? 1 : 0;
         s.right_in_time += r.right() && r.time_s <= kGiveUpWithin_s ? 1 : 0;
         if (r.right()) s.given_up_max_s = std::max(s.given_up_max_s, r.time_s);
+        if (r.right() && r.came_near_s >= 0.0) s.given_up_after_near_max_s = std::max(s.given_up_after_near_max_s, r.time_s - r.came_near_s);
         continue;
       }
       ++s.reachable;
@@ -148,6 +151,7 @@ nlohmann::json to_json(const GoalScore& s) {
           {"right_reason", s.right},
           {"right_reason_in_time", s.right_in_time},
           {"given_up_max_s", s.given_up_max_s},
+          {"given_up_after_near_max_s", s.given_up_after_near_max_s},
           {"kidnapped", s.kidnapped},
           {"found_again", s.found_again},
           {"carried_off", s.carried_off},
@@ -210,7 +214,8 @@ std::string goal_report_markdown(const std::vector<GoalRunResult>& runs, const s
   text += row("people who walked into the robot", "counted", fmt::format("{}", s.walker_contacts));
   text += row("reachable goals reached", ">= 99 %", fmt::format("{} of {} ({:.1f} %)", s.reached, s.reachable, 100.0 * ratio(s.reached, s.reachable)));
   text += row("unreachable ones given up with the right reason, within 60 s", "all",
-              fmt::format("{} of {}, {} within 60 s (longest {:.0f} s)", s.right, s.unreachable, s.right_in_time, s.given_up_max_s));
+              fmt::format("{} of {}, {} within 60 s (longest {:.0f} s; {:.0f} s since it came within {:.0f} m of the closed door)", s.right, s.unreachable,
+                          s.right_in_time, s.given_up_max_s, s.given_up_after_near_max_s, kNear_m));
   text += row("mean speed, from goal to arrival", ">= 0.45 m/s", fmt::format("{:.3f} m/s ({:.3f} while not standing), {:.0f} m", s.speed_mps, s.moving_speed_mps, s.distance_m));
   text += row("from the goal, by the localizer", "<= 0.05 m", fmt::format("mean {:.3f}, max {:.3f} m", s.estimate_off_mean_m, s.estimate_off_max_m));
   text += row("from the goal, in truth (with the map's own errors)", "", fmt::format("mean {:.3f}, max {:.3f} m", s.true_off_mean_m, s.true_off_max_m));

@@ -38,7 +38,8 @@ class GoalDriver {
     result_.goal = goal;
     label_ = label;
     const Pose2 T_map_goal = world_in_map_ * goal.T_world_goal;
-    const double start_s = loop_.now_s(), start_m = loop_.simulator().distance_driven_m();
+    start_s_ = loop_.now_s();
+    const double start_s = start_s_, start_m = loop_.simulator().distance_driven_m();
     const double straight_m = distance_m(loop_.simulator().T_world_base(), goal.T_world_goal);
     double limit_s = goal.expected == Expected::kReached ? kGrace_s + 2.0 * straight_m / kSlow_mps : kUnreachable_s;
     if (goal.kidnap) limit_s += kKidnapped_s + 2.0 * distance_m(goal.T_world_kidnap, goal.T_world_goal) / kSlow_mps;
@@ -109,6 +110,7 @@ class GoalDriver {
       directions_.add(loop_.simulator().T_world_base());
       if (std::abs(command.v_mps) < kStands_mps && std::abs(command.w_radps) < kStands_radps) result_.standing_s += kWatch_s;
       watch_localization();
+      watch_closed_door();
     }
     return command;
   }
@@ -127,6 +129,13 @@ class GoalDriver {
     if (!watch_ || !watch_->forgiven(m)) result_.localization.add(m);
   }
 
+  void watch_closed_door() {
+    if (result_.goal.expected != Expected::kBlocked || result_.came_near_s >= 0.0) return;
+    const Pose2& at = loop_.simulator().T_world_base();
+    const Point2& closed = result_.goal.closed_at;
+    if (std::hypot(at.x_m - closed.x_m, at.y_m - closed.y_m) < kNear_m) result_.came_near_s = loop_.now_s() - start_s_;
+  }
+
   void note_failure() {
     const Failure& failure = loop_.stack().failure();
     result_.failure_code = static_cast<int>(failure.code);
@@ -142,6 +151,7 @@ class GoalDriver {
   std::function<void()> poll_;
   GoalResult result_;
   std::string label_;
+  double start_s_ = 0.0;  ///< of the goal
   double driving_s_ = 0.0;
   int plans_ = 0;
   std::size_t last_plans_ = 0;

@@ -24,7 +24,7 @@ into the map's keepout mask. Further goals have the robot carried off on the way
 OUT receives map/ (of the mapping drive), suite.json (the goals, and each run's changes as a world file has them), run_NN.json,
 .png (truth green, estimate red, crosses where it went wrong), _truth.tum, _estimate.tum, run_NN_GOAL.bag with the 30 s before
 what went wrong, report.json and report.md. What OUT has already is not driven again; --merge puts several buildings together.
-run_NN.json: goals[] with right, reached (false if it stands more than 1 m off in truth), failure_code, reason, time_s, distance_m, standing_s, localization (over time_s, without
+run_NN.json: goals[] with right, reached (false if it stands more than 1 m off in truth), failure_code, reason, time_s, came_near_s (until within 3 m of the door that closes it, -1 never), distance_m, standing_s, localization (over time_s, without
 5 s after being carried off: ok_s, lost_s, ok_wrong_s, ...), carried_off, noticed_s, right_s (since then, -1 never), estimate_off_m and true_off_m from the goal, turned_round and sways (changes of mind), collisions, walker_contacts.
 report.json: the sums, with the names of report.md.)";
 

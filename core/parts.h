@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
 
 #include <cstddef>
 
@@ -18,9 +19,12 @@ void in_parts(std::size_t count, int threads, const Work& work) {
     work(std::size_t{0}, count);
     return;
   }
-  tbb::parallel_for(
-      std::size_t{0}, parts, [&](std::size_t k) { work(count * k / parts, count * (k + 1) / parts); },
-      tbb::simple_partitioner());
+  // Isolated: who waits for the rest must not take up a task from outside, which may need what `work` uses of this thread.
+  tbb::this_task_arena::isolate([&] {
+    tbb::parallel_for(
+        std::size_t{0}, parts, [&](std::size_t k) { work(count * k / parts, count * (k + 1) / parts); },
+        tbb::simple_partitioner());
+  });
 }
 
 }  // namespace knav

@@ -214,6 +214,7 @@ TEST(GoalScore, SpeedIsOfReachedGoalsReversalsOfAllAndKidnapsAreCountedApart) {
   run.goals.back().turned_round = 3;
   run.goals.push_back(result_of(Expected::kBlocked, false, 70.0, 8.0));
   run.goals.back().failure_code = static_cast<int>(FailureCode::kBlocked);
+  run.goals.back().came_near_s = 25.0;
   run.goals.push_back(result_of(Expected::kOccupied, false, 0.1, 0.0));
   run.goals.back().failure_code = static_cast<int>(FailureCode::kNoPath);
   run.goals.push_back(result_of(Expected::kReached, true, 100.0, 30.0));
@@ -228,6 +229,8 @@ TEST(GoalScore, SpeedIsOfReachedGoalsReversalsOfAllAndKidnapsAreCountedApart) {
   EXPECT_EQ(s.unreachable, 2);
   EXPECT_EQ(s.right, 1) << "no path is not what is wrong with a goal in a wall";
   EXPECT_EQ(s.right_in_time, 0) << "70 s";
+  EXPECT_DOUBLE_EQ(s.given_up_max_s, 70.0);
+  EXPECT_DOUBLE_EQ(s.given_up_after_near_max_s, 45.0);
   EXPECT_EQ(s.kidnapped, 1);
   EXPECT_EQ(s.found_again, 1);
   EXPECT_EQ(s.noticed, 1);

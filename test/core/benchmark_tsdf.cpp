@@ -63,34 +63,48 @@ void prepare_observation(benchmark::State& state) {
 }
 BENCHMARK(prepare_observation)->Arg(3)->Arg(18)->Unit(benchmark::kMicrosecond)->Apply(shortest);
 
-void integrate_and_remove(benchmark::State& state) {
-  TsdfGrid grid(TsdfConfig{}, 25.0);
+void per_reading(benchmark::State& state, std::size_t count) {
+  state.counters["ns_per_particle_reading"] =
+      benchmark::Counter(static_cast<double>(state.iterations()) * static_cast<double>(count) * 120e-9,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
+/// Arguments: distance of the walls [m], threads.
+template <class Remove>
+void integrate(benchmark::State& state, const Remove& remove) {
+  TsdfConfig config;
+  config.threads = static_cast<int>(state.range(1));
+  TsdfGrid grid(config, 25.0);
   std::uint32_t sequence = 0;
   TsdfObservation o = kinect_observation(static_cast<double>(state.range(0)), 1);
   for (auto _ : state) {
     o.sequence = ++sequence;
     o.T_map_sensor.yaw_rad = 0.1 * sequence;
     grid.add(o);
-    grid.remove(o);
+    remove(o, &grid);
   }
 }
-BENCHMARK(integrate_and_remove)->Arg(3)->Arg(10)->Arg(18)->Unit(benchmark::kMicrosecond)->Apply(shortest);
+/// By the clock on the wall: several threads take as much of the processors' time as one.
+void distances_and_threads(benchmark::internal::Benchmark* b) {
+  b->ArgsProduct({{3, 10, 18}, {1, 2}})->Unit(benchmark::kMicrosecond)->UseRealTime();
+  shortest(b);
+}
+
+void integrate_and_remove(benchmark::State& state) {
+  integrate(state, [](const TsdfObservation& o, TsdfGrid* grid) { grid->remove(o); });
+}
+BENCHMARK(integrate_and_remove)->Apply(distances_and_threads);
 
 /// As the sliding window does: the part beyond window/far_m leaves by itself.
 void integrate_and_remove_in_two_parts(benchmark::State& state) {
-  TsdfGrid grid(TsdfConfig{}, 25.0);
-  std::uint32_t sequence = 0;
-  TsdfObservation o = kinect_observation(static_cast<double>(state.range(0)), 1);
-  for (auto _ : state) {
-    o.sequence = ++sequence;
-    o.T_map_sensor.yaw_rad = 0.1 * sequence;
-    grid.add(o);
-    grid.remove(o, {6.0f});
-    grid.remove(o, {0.0f, 6.0f});
-  }
+  integrate(state, [](const TsdfObservation& o, TsdfGrid* grid) {
+    grid->remove(o, {6.0f});
+    grid->remove(o, {0.0f, 6.0f});
+  });
 }
-BENCHMARK(integrate_and_remove_in_two_parts)->Arg(3)->Arg(10)->Arg(18)->Unit(benchmark::kMicrosecond)->Apply(shortest);
+BENCHMARK(integrate_and_remove_in_two_parts)->Apply(distances_and_threads);
 
+/// Arguments: particles, threads.
 void align(benchmark::State& state) {
   const TsdfGrid grid = hall(8.0);
   const auto count = static_cast<std::size_t>(state.range(0));
@@ -106,12 +120,10 @@ void align(benchmark::State& state) {
     points.add(8.0f, static_cast<float>(-8.0 * right), 1.0f);
   }
   std::vector<float> cost;
-  for (auto _ : state) tsdf_alignment_costs(grid, points, particles, 0.6f, &cost);
-  state.counters["ns_per_particle_reading"] =
-      benchmark::Counter(static_cast<double>(state.iterations()) * static_cast<double>(count) * 120e-9,
-                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  for (auto _ : state) tsdf_alignment_costs(grid, points, particles, 0.6f, &cost, static_cast<int>(state.range(1)));
+  per_reading(state, count);
 }
-BENCHMARK(align)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond)->Apply(shortest);
+BENCHMARK(align)->ArgsProduct({{1000, 2000, 10000, 50000}, {1, 2}})->Unit(benchmark::kMicrosecond)->UseRealTime()->Apply(shortest);
 
 #ifdef KNAV_HAVE_AVX2_CODE
 /// Particles within spread_m of the middle of a 1,024 x 1,024 grid of 5 cm, 120 readings up to 12 m away.
@@ -134,12 +146,6 @@ struct Crowd {
   GridGeometry geometry{1024, 1024, 0.05, -25.6, -25.6};
   std::vector<std::uint32_t> words = std::vector<std::uint32_t>(1024 * 1024);
 };
-
-void per_reading(benchmark::State& state, std::size_t count) {
-  state.counters["ns_per_particle_reading"] =
-      benchmark::Counter(static_cast<double>(state.iterations()) * static_cast<double>(count) * 120e-9,
-                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
-}
 
 /// Arguments: particles, spread in centimetres.
 void crowds(benchmark::internal::Benchmark* b) {
