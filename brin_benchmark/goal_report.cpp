@@ -215,7 +215,7 @@ std::string goal_report_markdown(const std::vector<GoalRunResult>& runs, const s
   text += row("reachable goals reached", ">= 99 %", fmt::format("{} of {} ({:.1f} %)", s.reached, s.reachable, 100.0 * ratio(s.reached, s.reachable)));
   text += row("unreachable ones given up with the right reason, within 60 s", "all",
               fmt::format("{} of {}, {} within 60 s (longest {:.0f} s; {:.0f} s since it came within {:.0f} m of the closed door)", s.right, s.unreachable,
-                          s.right_in_time, s.given_up_max_s, s.given_up_after_near_max_s, kNear_m));
+                          s.right_in_time, s.given_up_max_s, s.given_up_after_near_max_s, kNearClosedDoor_m));
   text += row("mean speed, from goal to arrival", ">= 0.45 m/s", fmt::format("{:.3f} m/s ({:.3f} while not standing), {:.0f} m", s.speed_mps, s.moving_speed_mps, s.distance_m));
   text += row("from the goal, by the localizer", "<= 0.05 m", fmt::format("mean {:.3f}, max {:.3f} m", s.estimate_off_mean_m, s.estimate_off_max_m));
   text += row("from the goal, in truth (with the map's own errors)", "", fmt::format("mean {:.3f}, max {:.3f} m", s.true_off_mean_m, s.true_off_max_m));

@@ -20,7 +20,7 @@ struct GoalScore {
   double reversals_per_20s = 0.0;
   double estimate_off_max_m = 0.0, estimate_off_mean_m = 0.0, true_off_max_m = 0.0, true_off_mean_m = 0.0;
   double given_up_max_s = 0.0;             ///< from being sent ...
-  double given_up_after_near_max_s = 0.0;  ///< ... and from coming within kNear_m of the closed door
+  double given_up_after_near_max_s = 0.0;  ///< ... and from coming within kNearClosedDoor_m of the closed door
   double moved_after_mps = 0.0;
   double plans_per_s = 0.0, control_max_ms = 0.0, frame_cost_ms = 0.0;
 };

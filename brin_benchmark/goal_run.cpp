@@ -133,7 +133,7 @@ class GoalDriver {
     if (result_.goal.expected != Expected::kBlocked || result_.came_near_s >= 0.0) return;
     const Pose2& at = loop_.simulator().T_world_base();
     const Point2& closed = result_.goal.closed_at;
-    if (std::hypot(at.x_m - closed.x_m, at.y_m - closed.y_m) < kNear_m) result_.came_near_s = loop_.now_s() - start_s_;
+    if (std::hypot(at.x_m - closed.x_m, at.y_m - closed.y_m) < kNearClosedDoor_m) result_.came_near_s = loop_.now_s() - start_s_;
   }
 
   void note_failure() {

@@ -10,7 +10,7 @@
 
 namespace knav {
 
-inline constexpr double kNear_m = 3.0;  ///< from where a robot that faces a door sees whether it is closed
+inline constexpr double kNearClosedDoor_m = 3.0;  ///< from where a robot that faces a door sees whether it is closed
 
 /// How a goal went.
 struct GoalResult {
@@ -20,7 +20,7 @@ struct GoalResult {
   std::string reason;              ///< of those not reached
   double reason_off_m = 0.0;       ///< blocked: from the point it names to the closed door
   double time_s = 0.0, distance_m = 0.0;
-  double came_near_s = -1.0;       ///< blocked: of time_s, until it first was within kNear_m of the closed door; -1: never
+  double came_near_s = -1.0;       ///< blocked: of time_s, until it first was within kNearClosedDoor_m of the closed door; -1: never
   double standing_s = 0.0;         ///< of time_s, neither moving nor turning
   double estimate_off_m = 0.0;     ///< reached: where the localizer says it stands, to the goal
   double true_off_m = 0.0;         ///< said to be reached: where it stands, to the goal
