@@ -11,8 +11,7 @@ namespace knav {
 /// For each particle the weighted mean over the readings of |F|, F interpolated between the known cells (W =
 /// 0 enters no interpolation); the unknown share of a reading's four cells costs `unknown_price` instead.
 /// Equation 7, normalised: in [0, 1]. F is quantised to 1/127, a reading's place to 1/256 of a cell. Same bytes with
-/// and without SIMD,
-/// and with any number of threads.
+/// and without SIMD, and with any number of threads.
 /// @param vectors  false: plain code even where there is AVX2, for tests
 void tsdf_alignment_costs(const TsdfGrid& grid, const WeightedPoints& points_robot, const ParticleSet& particles,
                           float unknown_price, std::vector<float>* cost, int threads = 1, bool vectors = true);
