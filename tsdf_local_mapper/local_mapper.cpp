@@ -4,15 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <type_traits>
 
 #include "core/config.h"
 #include "core/contour.h"
-#include "core/pose_buffer.h"
 #include "tsdf_local_mapper/close_obstacles.h"
 #include "tsdf_local_mapper/local_map.h"
 #include "tsdf_local_mapper/odometry_bound.h"
+#include "tsdf_local_mapper/odometry_stream.h"
 #include "tsdf_local_mapper/pose_filter.h"
 #include "tsdf_local_mapper/range_errors.h"
 #include "tsdf_local_mapper/reading_selection.h"
@@ -38,50 +37,6 @@ ObservationLimits limits_of(const LocalMapperConfig& config) {
 
 }  // namespace
 
-const char* to_string(FrameOutcome outcome) {
-  switch (outcome) {
-    case FrameOutcome::kAligned:
-      return "aligned";
-    case FrameOutcome::kStarted:
-      return "started";
-    case FrameOutcome::kNoReadings:
-      return "no readings";
-    case FrameOutcome::kParked:
-      return "parked";
-    case FrameOutcome::kSuspicious:
-      return "suspicious";
-    case FrameOutcome::kDuplicate:
-      return "duplicate";
-    case FrameOutcome::kOutOfOrder:
-      return "out of order";
-    case FrameOutcome::kWaitForOdometry:
-      return "waiting for odometry";
-    case FrameOutcome::kNoOdometry:
-      return "no odometry";
-    case FrameOutcome::kBadFrame:
-      return "bad frame";
-  }
-  return "?";
-}
-
-const char* to_string(EpochReason reason) {
-  switch (reason) {
-    case EpochReason::kStart:
-      return "start";
-    case EpochReason::kReset:
-      return "reset";
-    case EpochReason::kClockJump:
-      return "clock jumped back";
-    case EpochReason::kOdometryGap:
-      return "odometry gap";
-    case EpochReason::kOdometryJump:
-      return "odometry jumped";
-    case EpochReason::kCarried:
-      return "carried";
-  }
-  return "?";
-}
-
 struct LocalMapper::State {
   explicit State(const LocalMapperConfig& c)
       : config(c),
@@ -93,9 +48,9 @@ struct LocalMapper::State {
         odometry_bound(c.odometry_bound, c.motion),
         view_check(c.continuity, c.contour, c.range_max_m),
         close_obstacles(c.close_obstacles),
-        range_errors(c.range_errors, c.tsdf) {}
+        range_errors(c.range_errors, c.tsdf),
+        odometry(c.continuity) {}
 
-  void add_odometry(double stamp_s, const Pose2& T_odom_base);
   void new_epoch(EpochReason why, const std::string& text);
   void forget_pose();
   void note_motion(double stamp_s);
@@ -119,9 +74,7 @@ struct LocalMapper::State {
   CloseObstacles close_obstacles;
   RangeErrors range_errors;
   DepthProfile corrected;
-  PoseBuffer odometry;
-  bool odometry_broken = false;  ///< a gap or jump since the last frame
-  EpochReason odometry_fault = EpochReason::kOdometryGap;
+  OdometryStream odometry;
 
   bool have_frame = false;  ///< stamp_s, T_odom_base and T_local_base of `result` mean something
   bool have_map = false;
@@ -137,31 +90,6 @@ struct LocalMapper::State {
   LocalMapperResult result;
   LocalMapperResult rejected;
 };
-
-void LocalMapper::State::add_odometry(double stamp_s, const Pose2& T_odom_base) {
-  if (!std::isfinite(stamp_s) || !is_finite(T_odom_base)) return;
-  if (!odometry.empty()) {
-    const double newest_s = odometry.newest_s();
-    if (stamp_s <= newest_s) {
-      if (newest_s - stamp_s <= config.continuity.clock_jump_s) return;
-      odometry.clear();  // the clock jumped back; the next frame will find so too
-    } else {
-      Pose2 newest;
-      odometry.at(newest_s, 1e9, 0.0, &newest);
-      const double dt = stamp_s - newest_s, step = distance_m(newest, T_odom_base);
-      if (dt > config.continuity.odometry_gap_s) {
-        odometry_broken = true;
-        odometry_fault = EpochReason::kOdometryGap;
-        odometry.clear();
-      } else if (step > config.continuity.odometry_max_speed_mps * std::max(dt, 0.02) + 0.05) {
-        odometry_broken = true;
-        odometry_fault = EpochReason::kOdometryJump;
-        odometry.clear();
-      }
-    }
-  }
-  odometry.add(stamp_s, T_odom_base);
-}
 
 const LocalMapperResult& LocalMapper::State::reject(FrameOutcome outcome, double stamp_s,
                                                     const std::string& reason) {
@@ -294,13 +222,12 @@ const LocalMapperResult& LocalMapper::State::update(const Frame& frame, bool sen
     }
     const std::string text =
         fmt::format("the clock jumped back by {:.1f} s; map and pose start anew", result.stamp_s - stamp_s);
-    if (!odometry.empty() && odometry.oldest_s() > stamp_s + config.continuity.clock_jump_s) odometry.clear();
+    odometry.clock_jumped_back_to(stamp_s);
     new_epoch(EpochReason::kClockJump, text);
     forget_pose();
   }
   Pose2 T_odom_base;
-  switch (odometry.at(stamp_s, config.continuity.odometry_gap_s, config.continuity.odometry_extrapolation_s,
-                      &T_odom_base)) {
+  switch (odometry.at(stamp_s, &T_odom_base)) {
     case PoseBuffer::Lookup::kOk:
       break;
     case PoseBuffer::Lookup::kEmpty:
@@ -312,13 +239,14 @@ const LocalMapperResult& LocalMapper::State::update(const Frame& frame, bool sen
       return reject(FrameOutcome::kNoOdometry, stamp_s, "odometry has a gap at the frame's stamp");
   }
   if (!any_epoch) new_epoch(EpochReason::kStart, "");
-  if (have_frame && odometry_broken) {
-    new_epoch(odometry_fault, odometry_fault == EpochReason::kOdometryGap
-                                  ? "odometry was silent; nothing links the poses before and after"
-                                  : "odometry jumped; nothing links the poses before and after");
+  const OdometryStream::Break odometry_break = odometry.take_break();
+  if (have_frame && odometry_break != OdometryStream::Break::kNone) {
+    const bool gap = odometry_break == OdometryStream::Break::kGap;
+    new_epoch(gap ? EpochReason::kOdometryGap : EpochReason::kOdometryJump,
+              gap ? "odometry was silent; nothing links the poses before and after"
+                  : "odometry jumped; nothing links the poses before and after");
     result.T_odom_base = T_odom_base;  // no step
   }
-  odometry_broken = false;
 
   const Pose2 T_step = have_frame ? result.T_odom_base.inverse() * T_odom_base : Pose2{};
   const double dt = have_frame ? stamp_s - result.stamp_s : 0.0;
@@ -359,7 +287,7 @@ LocalMapper::LocalMapper(const LocalMapperConfig& config)
 LocalMapper::~LocalMapper() = default;
 
 void LocalMapper::add_odometry(double stamp_s, const Pose2& T_odom_base) {
-  state_->add_odometry(stamp_s, T_odom_base);
+  state_->odometry.add(stamp_s, T_odom_base);
 }
 
 const LocalMapperResult& LocalMapper::update(const DepthProfile& profile, const Pose2& T_base_camera) {
@@ -400,7 +328,6 @@ void LocalMapper::reset() {
   state_->new_epoch(EpochReason::kReset, "reset on request; map and pose start anew");
   state_->forget_pose();
   state_->odometry.clear();
-  state_->odometry_broken = false;
 }
 
 const LocalMapperConfig& LocalMapper::config() const { return state_->config; }
