@@ -19,15 +19,18 @@ struct GridPlanner::Search {
   explicit Search(const PlannerTrackerConfig& c) : config(c) {}
 
   PlannerTrackerConfig config;
-  ClearancePrice price, keep_price;
+  ClearancePrice hard_price, keep_price;
+  bool narrow = false;
   GridSearch coarse, fine;
   std::vector<Cell> cells, escape;
   std::vector<Point2> points;
   PathShortener shortener;
   const MapLayer* labelled = nullptr;  ///< the layer given to set_map
-  std::vector<std::uint16_t> part;     ///< per cell: its connected part; 0 = closed, or one part too many
+  /// Per cell: its connected part; 0 = closed, or one part too many. narrow_part only once it was needed.
+  std::vector<std::uint16_t> part, narrow_part;
 
-  void label_parts(const MapLayer& layer);
+  const ClearancePrice& price() const { return narrow ? keep_price : hard_price; }
+  static void label_parts(const MapLayer& layer, const ClearancePrice& price, std::vector<std::uint16_t>* part);
   bool apart(const MapLayer& layer, const Cell& a, const Cell& b) const;
   bool find_escape(const MapLayer& layer, const Cell& start, Cell* out);
   bool find_way(const MapLayer& layer, const Cell& start, const Cell& goal, PlanResult* result);
@@ -37,8 +40,8 @@ GridPlanner::GridPlanner(const PlannerTrackerConfig& config) : search_(std::make
 GridPlanner::~GridPlanner() = default;
 
 /// Which open cells hang together: tells at once that no way leads to a goal.
-void GridPlanner::Search::label_parts(const MapLayer& layer) {
-  labelled = &layer;
+void GridPlanner::Search::label_parts(const MapLayer& layer, const ClearancePrice& price, std::vector<std::uint16_t>* parts) {
+  std::vector<std::uint16_t>& part = *parts;
   part.assign(layer.state.size(), 0);
   const SearchGraph graph(layer, price, 1);
   std::vector<std::uint32_t> stack;
@@ -64,17 +67,29 @@ void GridPlanner::Search::label_parts(const MapLayer& layer) {
 
 bool GridPlanner::Search::apart(const MapLayer& layer, const Cell& a, const Cell& b) const {
   if (&layer != labelled) return false;
-  const std::uint16_t pa = part[layer.geometry.index(a.ix, a.iy)],
-                      pb = part[layer.geometry.index(b.ix, b.iy)];
+  const std::vector<std::uint16_t>& parts = narrow ? narrow_part : part;
+  const std::uint16_t pa = parts[layer.geometry.index(a.ix, a.iy)], pb = parts[layer.geometry.index(b.ix, b.iy)];
   return pa != 0 && pb != 0 && pa != pb;
 }
 
 void GridPlanner::set_map(const MapLayer& layer) {
   const PlannerTrackerConfig& c = search_->config;
-  search_->price = ClearancePrice(layer, c.hard_radius_m(), c.preferred_radius_m(), c.clearance.price);
-  search_->keep_price = ClearancePrice(layer, c.keep_radius_m(), c.preferred_radius_m(), c.clearance.price);
-  search_->label_parts(layer);
+  Search& s = *search_;
+  s.hard_price = ClearancePrice(layer, c.hard_radius_m(), c.preferred_radius_m(), c.clearance.price);
+  s.keep_price = ClearancePrice(layer, c.keep_radius_m(), c.preferred_radius_m(), c.clearance.price);
+  s.labelled = &layer;
+  Search::label_parts(layer, s.hard_price, &s.part);
+  s.narrow_part.clear();
+  s.narrow = false;
 }
+
+void GridPlanner::set_narrow(bool narrow) {
+  Search& s = *search_;
+  s.narrow = narrow;
+  if (narrow && s.narrow_part.empty() && s.labelled != nullptr) Search::label_parts(*s.labelled, s.keep_price, &s.narrow_part);
+}
+
+bool GridPlanner::narrow() const { return search_->narrow; }
 
 /// Dijkstra from a closed cell through cells that never come nearer to something, to the first open one.
 /// Cells under the robot may be anything: it stands there.
@@ -97,7 +112,7 @@ bool GridPlanner::Search::find_escape(const MapLayer& layer, const Cell& start, 
     if (c > cost[static_cast<std::size_t>(at)]) continue;
     const int dx = at % side - r, dy = at / side - r;
     const std::int16_t here = layer.squared_at(start.ix + dx, start.iy + dy);
-    if (price.open(here)) {
+    if (price().open(here)) {
       *out = {start.ix + dx, start.iy + dy};
       for (int n = at; n >= 0; n = parent[static_cast<std::size_t>(n)]) {
         escape.push_back({start.ix + n % side - r, start.iy + n / side - r});
@@ -127,11 +142,11 @@ bool GridPlanner::Search::find_way(const MapLayer& layer, const Cell& start, con
     return false;
   }
   Cell nearest;
-  bool found = coarse.find(SearchGraph(layer, price, kStride), start, goal, &cells, &nearest);
+  bool found = coarse.find(SearchGraph(layer, price(), kStride), start, goal, &cells, &nearest);
   result->expanded += coarse.expanded();
   if (!found) {
     // A gap that lies between the coarse nodes.
-    found = fine.find(SearchGraph(layer, price, 1), start, goal, &cells, &nearest);
+    found = fine.find(SearchGraph(layer, price(), 1), start, goal, &cells, &nearest);
     result->expanded += fine.expanded();
   }
   if (!found) result->at = {layer.geometry.center_x_m(nearest.ix), layer.geometry.center_y_m(nearest.iy)};
@@ -146,7 +161,7 @@ void GridPlanner::plan(const MapLayer& layer, const Point2& start, const Point2&
   const GridGeometry& g = layer.geometry;
   Cell from{g.cell_x(start.x_m), g.cell_y(start.y_m)};
   const Cell to{g.cell_x(goal.x_m), g.cell_y(goal.y_m)};
-  if (!s.price.open(layer.squared_at(to.ix, to.iy))) {
+  if (!s.price().open(layer.squared_at(to.ix, to.iy))) {
     result->at = goal;
     result->code = PlanCode::kGoalUnknown;
     if (layer.at(to.ix, to.iy) == CellState::kUnknown) return;
@@ -165,7 +180,7 @@ void GridPlanner::plan(const MapLayer& layer, const Point2& start, const Point2&
     return;
   }
   s.escape.clear();
-  if (!s.price.open(layer.squared_at(from.ix, from.iy)) && !s.find_escape(layer, from, &from)) {
+  if (!s.price().open(layer.squared_at(from.ix, from.iy)) && !s.find_escape(layer, from, &from)) {
     result->code = PlanCode::kStartBlocked;
     result->at = start;
     return;
@@ -179,7 +194,7 @@ void GridPlanner::plan(const MapLayer& layer, const Point2& start, const Point2&
   for (const Cell& cell : s.cells) s.points.push_back({g.center_x_m(cell.ix), g.center_y_m(cell.iy)});
   if (s.escape.empty()) s.points.front() = start;
   s.points.back() = goal;
-  s.shortener.shorten(layer, s.price, &s.points);
+  s.shortener.shorten(layer, s.price(), &s.points);
   if (!s.escape.empty()) {
     result->path.push_back(start);
     for (std::size_t i = 1; i + 1 < s.escape.size(); ++i) {
@@ -190,7 +205,7 @@ void GridPlanner::plan(const MapLayer& layer, const Point2& start, const Point2&
   for (std::size_t i = 1; i < result->path.size(); ++i) {
     const Point2 &a = result->path[i - 1], &b = result->path[i];
     const double length = std::hypot(b.x_m - a.x_m, b.y_m - a.y_m);
-    const double cost = s.shortener.segment_cost_m(layer, s.price, a, b);
+    const double cost = s.shortener.segment_cost_m(layer, s.price(), a, b);
     result->length_m += length;
     // Parts of an escape are dear, not impossible.
     result->cost_m += std::isfinite(cost) ? cost : length * (1.0 + 2.0 * s.config.clearance.price);
@@ -198,7 +213,7 @@ void GridPlanner::plan(const MapLayer& layer, const Point2& start, const Point2&
 }
 
 double GridPlanner::segment_cost_m(const MapLayer& layer, const Point2& from, const Point2& to) const {
-  return search_->shortener.segment_cost_m(layer, search_->price, from, to);
+  return search_->shortener.segment_cost_m(layer, search_->price(), from, to);
 }
 
 double GridPlanner::kept_cost_m(const MapLayer& layer, const Point2& from, const Point2& to) const {
@@ -206,7 +221,7 @@ double GridPlanner::kept_cost_m(const MapLayer& layer, const Point2& from, const
 }
 
 bool GridPlanner::open(const MapLayer& layer, const Point2& point) const {
-  return search_->price.open(
+  return search_->price().open(
       layer.squared_at(layer.geometry.cell_x(point.x_m), layer.geometry.cell_y(point.y_m)));
 }
 
@@ -223,7 +238,7 @@ bool GridPlanner::nearest_open(const MapLayer& layer, const Point2& point, doubl
   int best = r * r + 1;
   for (int dy = -r; dy <= r; ++dy) {
     for (int dx = -r; dx <= r; ++dx) {
-      if (dx * dx + dy * dy >= best || !search_->price.open(layer.squared_at(cx + dx, cy + dy))) continue;
+      if (dx * dx + dy * dy >= best || !search_->price().open(layer.squared_at(cx + dx, cy + dy))) continue;
       best = dx * dx + dy * dy;
       *found = {g.center_x_m(cx + dx), g.center_y_m(cy + dy)};
     }

@@ -33,6 +33,9 @@ class GridPlanner {
 
   /// @param layer  the map without what changes; goals it cannot reach on this layer it refuses at once
   void set_map(const MapLayer& layer);
+  /// From now on ways may be as narrow as one once taken (ClearanceConfig::keep): for a goal to which nothing else leads.
+  void set_narrow(bool narrow);
+  bool narrow() const;
   /// @param layer same geometry as given to set_map
   void plan(const MapLayer& layer, const Point2& start, const Point2& goal, PlanResult* result);
 

@@ -32,6 +32,7 @@ class PlanKeeper {
   void set_map(const CombinedMap& map);
   void start_goal() {
     drop_path();
+    planner_.set_narrow(false);
     looks_ = 0;
     rounds_ = 0;
     closed_.clear();

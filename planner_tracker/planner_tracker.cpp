@@ -79,7 +79,9 @@ void PlannerTracker::set_map(const DistanceMap& distance, const OccupancyGrid& o
 
 void PlannerTracker::set_local_map(const OccupancyGrid& local, const Pose2& T_map_local) {
   State& s = *state_;
-  s.map.set_local(local, T_map_local, s.last_step_s, s.input.T_map_base, s.walkers.may_stand_at());
+  s.supposed = s.walkers.may_stand_at();
+  s.refused.add_to(&s.supposed, s.last_step_s, s.config.planning.closed_memory_s);
+  s.map.set_local(local, T_map_local, s.last_step_s, s.input.T_map_base, s.supposed);
   if (s.map.empty()) return;
   s.moving.update(s.map.global(), s.map.combined(), s.map.local_window(), {s.input.T_map_base.x_m, s.input.T_map_base.y_m}, s.last_step_s);
   s.walkers.update(s.moving.points(), s.map.combined(), s.input.T_map_base, s.last_step_s);
@@ -90,6 +92,7 @@ void PlannerTracker::clear_local_map() {
   state_->map.clear_local();
   state_->moving.reset(state_->map.global());
   state_->walkers.clear();
+  state_->refused.clear();
 }
 
 void PlannerTracker::set_scan(const RangeScan& scan, const Pose2& T_base_sensor) {
@@ -133,6 +136,11 @@ PlanResult PlannerTracker::make_plan(const Point2& start, const Point2& goal, do
     planner.nearest_open(s.map.combined(), goal, tolerance_m, &target);
   }
   planner.plan(s.map.combined(), start, target, &s.asked);
+  if (s.asked.code == PlanCode::kNoPath && !planner.narrow()) {  // as it would be driven
+    planner.set_narrow(true);
+    planner.plan(s.map.combined(), start, target, &s.asked);
+    planner.set_narrow(false);
+  }
   return s.asked;
 }
 
@@ -145,6 +153,7 @@ void PlannerTracker::State::begin(const Pose2& T_map_goal) {
   moves.end();
   next_plan_s = missing_since_s = blocked_since_s = looking_since_s = standing_since_s = near_since_s = lost_since_s = -1.0;
   avoidances = 0;
+  refused.clear();
 }
 
 void PlannerTracker::State::end_goal() {

@@ -9,6 +9,7 @@
 #include "planner_tracker/plan_keeper.h"
 #include "planner_tracker/planner_tracker.h"
 #include "planner_tracker/random_moves.h"
+#include "planner_tracker/refused_ways.h"
 #include "planner_tracker/scan_view.h"
 
 namespace knav {
@@ -98,6 +99,8 @@ struct PlannerTracker::State {
   double standing_since_s = -1.0;  ///< the same, but looking elsewhere in vain is no new beginning
   double near_since_s = -1.0;     ///< ... or anything else in the way, too near to see well
   int avoidances = 0;
+  RefusedWays refused;
+  std::vector<Point2> supposed;  ///< what stands where nobody sees it
   double lost_since_s = -1.0, found_since_s = -1.0, turned_rad = 0.0, last_yaw_rad = 0.0;
   bool lost_turn_done = false;
   int lost_rounds = 0;  ///< of looking round and wandering

@@ -127,6 +127,13 @@ bool PlannerTracker::State::replan(double now_s, const RobotState& robot) {
   ++plans;
   outcome = keeper.replan(map, robot.T_map_base, position(goal), now_s, moving.trail());
   using Outcome = PlanKeeper::Outcome;
+  if (outcome == Outcome::kNoPath && first) {
+    // A lane just as wide as the robot, in a map whose walls are a little too thick: better tried than given up.
+    keeper.planner().set_narrow(true);
+    outcome = keeper.replan(map, robot.T_map_base, position(goal), now_s, moving.trail());
+  }
+  // No way but the one that was refused: to be tried again.
+  if (outcome != Outcome::kToGoal && !keeper.holding()) refused.clear();
   // There was a way to this goal before: it is where the robot stands that has none.
   if (outcome == Outcome::kNoPath && !first) outcome = Outcome::kStartBlocked;
   const Point2& at = keeper.at();
@@ -213,6 +220,7 @@ bool PlannerTracker::State::avoiding(double now_s, const RobotState& robot) {
                        std::hypot(keeper.at().x_m - robot.T_map_base.x_m,
                                   keeper.at().y_m - robot.T_map_base.y_m) < kFloorSeenFrom_m;
     if (!waited && !oscillating && !stuck && !blind) return false;
+    if (waited && outcome == PlanKeeper::Outcome::kToGoal) refused.note(blocked_at, now_s);
     blocked_since_s = looking_since_s = standing_since_s = near_since_s = -1.0;
     watch.dithering_s(now_s, robot.T_odom_base, false, 0.0);
     ++avoidances;

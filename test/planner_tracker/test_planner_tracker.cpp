@@ -161,6 +161,63 @@ TEST(Refused, GoalsThatCannotBe) {
   EXPECT_EQ(world.driven_m, 0.0);
 }
 
+/// Two rooms joined by one gap.
+OccupancyGrid rooms_with_gap(double low_m, double high_m) {
+  OccupancyGrid grid = room(12.0, 6.0);
+  fill(&grid, 5.95, 0.0, 6.05, 6.0, 100);
+  fill(&grid, 5.95, low_m, 6.05, high_m, 0);
+  return grid;
+}
+
+TEST(NarrowWay, ThatOnlyTheMapMakesTooNarrowIsTriedWhereNothingElseLeads) {
+  // The gap is 0.6 m wide, in the map 0.45 m: too narrow for 0.4 m and 6 cm on either side, but not for 3 cm.
+  PlannerTrackerConfig config;
+  config.clearance.hard_m = 0.06;
+  for (int shift = 0; shift < 3; ++shift) {
+    const double low = 2.5 + 0.05 * shift;
+    const OccupancyGrid truth = rooms_with_gap(low, low + 0.6), map = rooms_with_gap(low + 0.05, low + 0.5);
+    GridPlanner as_wide_as_ever(config);
+    CombinedMap layers(config.preferred_radius_m() + 0.2, 65, 25);
+    layers.set_global({}, map, {});
+    as_wide_as_ever.set_map(layers.global());
+    PlanResult result;
+    as_wide_as_ever.plan(layers.global(), {2.0, 1.0}, {10.0, 4.0}, &result);
+    ASSERT_EQ(result.code, PlanCode::kNoPath);
+
+    ToyWorld world(truth, map, {2.0, 1.0, 0.0}, config);
+    const Pose2 goal{10.0, 4.0, 0.0};
+    EXPECT_EQ(world.planner.make_plan({2.0, 1.0}, {goal.x_m, goal.y_m}, 0.0).code, PlanCode::kOk);
+    ASSERT_TRUE(world.planner.set_goal(goal));
+    ASSERT_EQ(world.run(90.0).activity, Activity::kReached) << world.planner.failure().reason;
+    expect_at(world, goal);
+    ASSERT_TRUE(world.planner.set_goal({2.0, 5.0, 0.0}));  // out again
+    EXPECT_EQ(world.run(90.0).activity, Activity::kReached) << world.planner.failure().reason;
+    EXPECT_EQ(world.collisions, 0);
+  }
+}
+
+TEST(NarrowWay, NarrowerThanTheRobotIsRefusedAtOnce) {
+  const OccupancyGrid grid = rooms_with_gap(2.5, 2.85);
+  ToyWorld world(grid, grid, {2.0, 1.0, 0.0});
+  ASSERT_TRUE(world.planner.set_goal({10.0, 4.0, 0.0}));
+  EXPECT_EQ(world.run(2.0).activity, Activity::kFailed);
+  EXPECT_EQ(world.planner.failure().code, FailureCode::kNoPath);
+}
+
+TEST(NarrowWay, TheTrackerRefusesTwiceItGoesRound) {
+  // Just as wide as the map's planning takes for enough, and too narrow to keep 3 cm on either side.
+  OccupancyGrid grid = rooms_with_gap(2.5, 2.95);
+  fill(&grid, 5.95, 4.8, 6.05, 5.7, 0);  // another door
+  ToyWorld world(grid, grid, {4.0, 2.7, 0.0});
+  const PlanResult plan = world.planner.make_plan({4.0, 2.7}, {8.0, 2.7}, 0.0);
+  ASSERT_EQ(plan.code, PlanCode::kOk);
+  ASSERT_LT(plan.length_m, 4.5);
+  ASSERT_TRUE(world.planner.set_goal({8.0, 2.7, 0.0}));
+  ASSERT_EQ(world.run(120.0).activity, Activity::kReached) << world.planner.failure().reason;
+  EXPECT_EQ(world.collisions, 0);
+  EXPECT_GT(world.driven_m, 6.0);
+}
+
 TEST(Config, ContradictionsAreRefused) {
   PlannerTrackerConfig config;
   config.clearance.preferred_m = 0.01;
