@@ -240,7 +240,7 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
     for (const StampedPose2& pose : drives[d].trajectory) {
       trajectory.push_back({pose.stamp_s, corrected[d].at(pose.stamp_s, pose.T_map_robot)});
     }
-    mark_driven(geometry, trajectory, config_.robot_radius_m, &driven);
+    if (config_.robot_radius_m > 0.0) mark_driven(geometry, trajectory, config_.robot_radius_m + config_.driven_margin_m, &driven);
   }
   map.trajectory = joined(trajectories);
   built.drive = drives.back().trajectory;

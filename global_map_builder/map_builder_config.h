@@ -259,6 +259,7 @@ struct MapBuilderConfig {
   SurfaceConfig surface;
   double min_contour_piece_m = 0.25;
   double robot_radius_m = 0.20;
+  double driven_margin_m = 0.08;
   std::string distance = "exact";
   double size_max_m = 400.0;
   double min_change_m = 0.3;
@@ -276,6 +277,9 @@ struct MapBuilderConfig {
     v.number("robot_radius_m", robot_radius_m, 0, 2, "m",
              "Ground that the robot's body, a disc, was on is free, though the Kinect sees none of it; 0 = "
              "it says nothing.");
+    v.number("driven_margin_m", driven_margin_m, 0, 0.5, "m",
+             "Ground this far beside the body is free too where nobody has seen what is there: a planner that keeps its distance from "
+             "what is unknown could not follow the way that the robot has driven.");
     v.choice("distance", distance, {"exact", "paper"},
              "exact: distance transform of the contour. paper: ray tracing from every cell (minutes).");
     v.number("size_max_m", size_max_m, 5, 2000, "m",

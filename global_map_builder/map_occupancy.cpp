@@ -77,23 +77,22 @@ std::vector<bool> lone_holes(const GridGeometry& g, const std::vector<bool>& ope
 OccupancyGrid occupancy_from_surface(const GridGeometry& geometry, const std::vector<float>& value_m,
                                      const std::vector<bool>& driven, const Contour& contour, double rim_m,
                                      std::vector<float>* distance_m) {
+  const auto tolerance = static_cast<float>(kShadow_cells * geometry.resolution_m);
+  // Behind a surface the distance along a ray is never less than the true one. Where the nearest surface is farther off,
+  // rays passed on their way into another: the shadow of an edge, of which nothing is known. So where nothing was seen.
+  const auto unseen = [&](std::size_t i) { return !((*distance_m)[i] <= tolerance - value_m[i]); };
   std::vector<bool> open(value_m.size());
-  for (std::size_t i = 0; i < open.size(); ++i)
-    open[i] = value_m[i] > 0.0f || (std::isnan(value_m[i]) && driven[i]);
+  for (std::size_t i = 0; i < open.size(); ++i) open[i] = value_m[i] > 0.0f || (driven[i] && unseen(i));
   const std::vector<bool> hole = lone_holes(geometry, open, rim_m);
   OccupancyGrid occupancy;
   occupancy.geometry = geometry;
   occupancy.value.assign(value_m.size(), -1);
-  const auto tolerance = static_cast<float>(kShadow_cells * geometry.resolution_m);
   for (std::size_t i = 0; i < value_m.size(); ++i) {
     float& d = (*distance_m)[i];
     if (open[i] || hole[i]) {
       occupancy.value[i] = 0;
     } else {
-      // Behind a surface the distance along a ray is never less than the true one. Where the nearest surface is
-      // farther off, rays passed on their way into another: the shadow of an edge, of which nothing is known.
-      const bool shadow = !(d <= tolerance - value_m[i]);
-      d = shadow ? std::numeric_limits<float>::quiet_NaN() : -d;
+      d = unseen(i) ? std::numeric_limits<float>::quiet_NaN() : -d;
     }
   }
   mark_surface(contour, &occupancy);

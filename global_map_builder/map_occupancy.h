@@ -9,7 +9,7 @@
 
 namespace knav {
 
-/// The cells whose centres the robot's body was on.
+/// The cells whose centres lie within `radius_m` of the robot's way.
 void mark_driven(const GridGeometry& geometry, const Trajectory& trajectory, double radius_m,
                  std::vector<bool>* driven);
 
@@ -19,7 +19,7 @@ void mark_driven(const GridGeometry& geometry, const Trajectory& trajectory, dou
 /// @param open  per cell: seen free, or driven on
 std::vector<bool> lone_holes(const GridGeometry& geometry, const std::vector<bool>& open, double rim_m);
 
-/// Free (0): seen free, driven on, or a lone hole. Occupied (100): the contour runs through it. Else -1.
+/// Free (0): seen free, or driven on and not seen to be anything else, or a lone hole. Occupied (100): the contour runs through it. Else -1.
 /// @param value_m     signed distance [m] a cell, NaN = unknown
 /// @param distance_m  of each cell to the contour [m], unsigned; becomes signed, NaN where unknown
 OccupancyGrid occupancy_from_surface(const GridGeometry& geometry, const std::vector<float>& value_m,

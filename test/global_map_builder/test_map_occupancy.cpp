@@ -74,5 +74,38 @@ TEST(OccupancyFromSurface, HolesAndDrivenCellsAreFreeTheRestKeepsItsSign) {
   EXPECT_EQ(grid.value[index(8, 6)], 100);
 }
 
+TEST(OccupancyFromSurface, DrivenGroundIsFreeUnlessASurfaceWasSeenThere) {
+  // A row of cells of 0.05 m: free, unseen, the shadow of an edge (the nearest surface is farther off than the ray said),
+  // inside a wall, the wall itself.
+  const GridGeometry row{5, 1, 0.05, 0.0, 0.0};
+  const std::vector<float> value_m{0.1f, kNaN, -0.05f, -0.05f, 0.0f};
+  const Contour contour{{{0.201, 0.001}, {0.249, 0.049}}};
+  for (const bool was_there : {false, true}) {
+    std::vector<float> distance_m{0.2f, 0.4f, 0.4f, 0.05f, 0.0f};
+    const OccupancyGrid grid =
+        occupancy_from_surface(row, value_m, std::vector<bool>(5, was_there), contour, 0.0, &distance_m);
+    EXPECT_EQ(grid.value[0], 0);
+    EXPECT_EQ(grid.value[1], was_there ? 0 : -1);
+    EXPECT_EQ(grid.value[2], was_there ? 0 : -1);
+    EXPECT_EQ(grid.value[3], -1);
+    EXPECT_EQ(grid.value[4], 100);
+    EXPECT_EQ(std::isnan(distance_m[2]), !was_there);
+    EXPECT_FLOAT_EQ(distance_m[3], -0.05f);
+  }
+}
+
+// A planner keeps 4 cm off what is unknown: the way of a robot through ground that its camera never saw has to be wider than its body.
+TEST(MarkDriven, AStraightWayIsAsWideAsAsked) {
+  const GridGeometry room{60, 40, 0.05, 0.0, 0.0};
+  Trajectory straight;
+  for (int i = 0; i <= 100; ++i) straight.push_back({0.1 * i, {0.5 + 0.02 * i, 1.0, 0.0}});
+  std::vector<bool> driven(room.cell_count(), false);
+  mark_driven(room, straight, 0.28, &driven);
+  for (int iy = 0; iy < room.height_cells; ++iy) {
+    EXPECT_EQ(driven[room.index(30, iy)], std::abs(room.center_y_m(iy) - 1.0) <= 0.28) << iy;
+  }
+  EXPECT_FALSE(driven[room.index(1, 20)]);
+}
+
 }  // namespace
 }  // namespace knav
