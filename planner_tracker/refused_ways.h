@@ -7,8 +7,8 @@
 
 namespace knav {
 
-/// Where the tracker waited in vain although the plan leads on: lanes narrower than the map has them. What stands there is
-/// seen by nobody as closing the way, so that planning would lead back to it for ever.
+/// Where the tracker waited in vain although the plan leads on: lanes narrower than the map has them. No map
+/// shows what closes such a way, so that planning would lead back to it for ever.
 class RefusedWays {
  public:
   void clear() { places_.clear(); }
