@@ -27,6 +27,9 @@ bool any_round(const CellWindow& window, int ix, int iy, int r, const Any& any) 
 
 int cells(double length_m, const GridGeometry& geometry) { return static_cast<int>(std::lround(length_m / geometry.resolution_m)); }
 
+bool not_occupied(CellState state) { return state != CellState::kOccupied; }
+bool unknown(CellState state) { return state == CellState::kUnknown; }
+
 std::size_t at(const CellWindow& window, int ix, int iy) {
   return static_cast<std::size_t>(iy - window.y0) * static_cast<std::size_t>(window.width()) + static_cast<std::size_t>(ix - window.x0);
 }
@@ -114,31 +117,38 @@ void HalfSeen::widen(const MapLayer& global, const CellWindow& window, const Pos
   }
   half_.clear();
   outline_.clear();
+  new_.clear();
   for (int iy = y0; iy < y1; ++iy) {
     for (int ix = x0; ix < x1; ++ix) {
       if (open_[at(window, ix, iy)] == 0) continue;
       const Thing thing = collect_thing(window, at(window, ix, iy));
       if (thing == Thing::kHalfSeen) half_.insert(half_.end(), thing_.begin(), thing_.end());
       if (thing == Thing::kWhole) collect_outline(window, T_robot_map, *local);
+      new_.insert(new_.end(), thing_.begin(), thing_.end());
     }
   }
   const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
-  for (const auto& [cx, cy] : half_) occupy(cx, cy, wider_m_, window, robot, local, surface);
-  for (const auto& [cx, cy] : outline_) occupy(cx, cy, 0.0, window, robot, local, surface);
+  for (const auto& [cx, cy] : half_) occupy(cx, cy, wider_m_, window, robot, not_occupied, local, surface);
+  for (const auto& [cx, cy] : outline_) occupy(cx, cy, 0.0, window, robot, not_occupied, local, surface);
+  if (deep_m_ <= 0.0) return;
+  for (const auto& [cx, cy] : new_) occupy(cx, cy, deep_m_, window, robot, unknown, local, surface);
 }
 
 void HalfSeen::put(const std::vector<Point2>& middles, double radius_m, const CellWindow& window, const Point2& robot,
                    std::vector<CellState>* local, std::vector<SurfaceOffset>* surface) const {
-  for (const Point2& p : middles) occupy(geometry_.cell_x(p.x_m), geometry_.cell_y(p.y_m), radius_m, window, robot, local, surface);
+  for (const Point2& p : middles) {
+    occupy(geometry_.cell_x(p.x_m), geometry_.cell_y(p.y_m), radius_m, window, robot, not_occupied, local, surface);
+  }
 }
 
-void HalfSeen::occupy(int cx, int cy, double radius_m, const CellWindow& window, const Point2& robot, std::vector<CellState>* local,
-                      std::vector<SurfaceOffset>* surface) const {
+template <class MayBe>
+void HalfSeen::occupy(int cx, int cy, double radius_m, const CellWindow& window, const Point2& robot, const MayBe& may_be,
+                      std::vector<CellState>* local, std::vector<SurfaceOffset>* surface) const {
   const double r = radius_m / geometry_.resolution_m;
   any_round(window, cx, cy, static_cast<int>(r), [&](int x, int y) {
     const std::size_t i = at(window, x, y);
     const bool robots = std::hypot(geometry_.center_x_m(x) - robot.x_m, geometry_.center_y_m(y) - robot.y_m) < keep_off_m_;
-    if (robots || std::hypot(x - cx, y - cy) > r || (*local)[i] == CellState::kOccupied) return false;
+    if (robots || std::hypot(x - cx, y - cy) > r || !may_be((*local)[i])) return false;
     (*local)[i] = CellState::kSupposed;
     (*surface)[i] = {};
     return false;

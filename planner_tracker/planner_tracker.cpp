@@ -54,7 +54,7 @@ PlannerTracker::State::State(const PlannerTrackerConfig& c)
     : config(c),
       map(c.preferred_radius_m() + kBeyondPreferred_m, c.clearance.occupied_threshold,
           c.clearance.free_threshold, c.planning.closed_memory_s, 0.0,
-          {c.clearance.half_seen_m, c.clearance.half_seen_within_m, c.hard_radius_m()}),
+          {c.clearance.half_seen_m, c.clearance.half_seen_within_m, c.hard_radius_m(), c.clearance.unseen_depth_m}),
       walkers(c.tracking.walker_stands_s),
       keeper(c),
       tracker(c),

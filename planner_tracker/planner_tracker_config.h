@@ -17,6 +17,7 @@ struct ClearanceConfig {
   double escape_m = 1.0;
   double half_seen_m = 0.1;
   double half_seen_within_m = 1.3;
+  double unseen_depth_m = 0.3;
   int occupied_threshold = 65;
   int free_threshold = 25;
 
@@ -38,6 +39,9 @@ struct ClearanceConfig {
              "What came up near the robot and was never in view from farther away than half_seen_within_m counts as so much wider all round: "
              "of somebody who stepped beside it the camera has seen legs only. 0 = off.");
     v.number("half_seen_within_m", half_seen_within_m, 0, 4, "m", "By a camera of the Kinect's view 0.3 m above the floor: beyond, it sees a body.");
+    v.number("unseen_depth_m", unseen_depth_m, 0, 2, "m",
+             "What is not the map's may be this deep behind what was seen of it: ground so near to it that the local map has not seen is not "
+             "driven on. 0 = it is, where the map says free.");
     v.integer("occupied_threshold", occupied_threshold, 1, 100, "%",
               "Cells of a map from here on are occupied.");
     v.integer("free_threshold", free_threshold, 0, 99, "%", "Cells up to this are free; between is unknown.");

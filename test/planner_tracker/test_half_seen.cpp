@@ -106,5 +106,51 @@ TEST(HalfSeen, WallsOfTheMapThatLieAFewCellsOffAndWideThingsAreAsTheyAre) {
   EXPECT_EQ(other.at(2.92, 2.1), CellState::kFree);
 }
 
+/// The front of a box, 3.00 to 3.30 wide at y = 2.00 to 2.05, as a camera at its foot sees it, and the ground behind it, 2.05 to 2.60, of which that sees nothing.
+OccupancyGrid front_of_a_box() {
+  OccupancyGrid local = room(6.0, 4.0);
+  fill(&local, kX0, 2.05, kX1, 2.6, -1);
+  fill(&local, kX0, 2.0, kX1, 2.05, 100);
+  return local;
+}
+
+CellState at(const CombinedMap& map, double x_m, double y_m) {
+  const GridGeometry& g = map.combined().geometry;
+  return map.combined().at(g.cell_x(x_m), g.cell_y(y_m));
+}
+
+TEST(HalfSeen, WhatTheMapDoesNotHaveHasABackWhereNobodyLooked) {
+  const Pose2 robot{3.15, 0.5, 1.57};
+  CombinedMap flat(0.7, 65, 25, 0.0, 0.0, {0.1, 1.3, 0.24, 0.0}), deep(0.7, 65, 25, 0.0, 0.0, {0.1, 1.3, 0.24, 0.3});
+  for (CombinedMap* map : {&flat, &deep}) {
+    map->set_global({}, room(6.0, 4.0), {});
+    map->set_local(front_of_a_box(), {}, 100.0, robot);
+  }
+  EXPECT_EQ(at(flat, 3.15, 2.2), CellState::kFree) << "the global map's word";
+  EXPECT_EQ(at(deep, 3.15, 2.2), CellState::kSupposed);
+  EXPECT_EQ(at(deep, 3.15, 2.32), CellState::kSupposed);
+  EXPECT_EQ(at(deep, 3.15, 2.37), CellState::kFree) << "the seventh cell behind the front";
+  EXPECT_EQ(at(deep, 3.32, 2.1), CellState::kFree) << "seen beside it";
+  EXPECT_EQ(at(deep, 3.15, 1.97), CellState::kFree) << "seen before it";
+  // Once somebody has looked behind it, that is what counts.
+  OccupancyGrid from_behind = front_of_a_box();
+  fill(&from_behind, kX0, 2.1, kX1, 2.6, 0);
+  deep.set_local(from_behind, {}, 101.0, robot);
+  EXPECT_EQ(at(deep, 3.15, 2.07), CellState::kSupposed);
+  EXPECT_EQ(at(deep, 3.15, 2.12), CellState::kFree);
+  // And where the robot is nothing else is.
+  deep.set_local(front_of_a_box(), {}, 102.0, {3.15, 2.45, 1.57});
+  EXPECT_EQ(at(deep, 3.15, 2.32), CellState::kFree);
+}
+
+TEST(HalfSeen, AWallOfTheMapHasNoBack) {
+  OccupancyGrid walled = room(6.0, 4.0);
+  fill(&walled, kX0, 2.0, kX1, 2.05, 100);
+  CombinedMap deep(0.7, 65, 25, 0.0, 0.0, {0.1, 1.3, 0.24, 0.3});
+  deep.set_global({}, walled, {});
+  deep.set_local(front_of_a_box(), {}, 100.0, {3.15, 0.5, 1.57});
+  EXPECT_EQ(at(deep, 3.15, 2.2), CellState::kFree);
+}
+
 }  // namespace
 }  // namespace knav
