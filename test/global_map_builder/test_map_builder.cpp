@@ -115,6 +115,28 @@ TEST(MapBuilder, TheSameDriveGivesTheSameMap) {
   EXPECT_EQ(checksum[0], checksum[1]);
 }
 
+TEST(MapBuilder, GroundThatTheRobotStoodOnUnseenIsFreeAsWideAsItsBodyAndTheMargin) {
+  Route drive;
+  drive.truth = drive_through({{0, 0}, {3, 0}});
+  drive.odometry = drive.truth;
+  // Beside the start, where the camera never looked: how far off the last free cell's middle is.
+  const auto free_beside_start_m = [&](double margin_m) {
+    MapBuilderConfig config = only(true, true);
+    config.robot_radius_m = 0.2;
+    config.driven_margin_m = margin_m;
+    MapBuilder builder(config, small_mapper());
+    feed(drive, {}, &builder);
+    const BuiltMap built = builder.build();
+    const GridGeometry& g = built.map.occupancy.geometry;
+    double free_m = 0.0;
+    for (int iy = g.cell_y(0.01); built.map.occupancy.value[g.index(g.cell_x(0.0), iy)] == 0; ++iy) free_m = g.center_y_m(iy);
+    return free_m;
+  };
+  const double cell_m = 0.05;
+  EXPECT_NEAR(free_beside_start_m(0.0), 0.2, cell_m);
+  EXPECT_NEAR(free_beside_start_m(0.1), 0.3, cell_m);
+}
+
 TEST(MapBuilder, SaysWhenThereIsNothingToMap) {
   MapBuilder empty({}, small_mapper());
   EXPECT_THROW(empty.build(), UserError);
