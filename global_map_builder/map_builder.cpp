@@ -23,22 +23,25 @@ namespace {
 
 using Report = std::function<void(const char*, double)>;
 
-/// The part of the grid that is known, with a margin.
+/// The part of the grid that is known or was driven on, with a margin.
 struct Crop {
   int low_x, low_y, high_x, high_y;
 };
-Crop known_part(const GridGeometry& g, const std::vector<float>& value) {
+Crop known_part(const GridGeometry& g, const std::vector<float>& value, const std::vector<bool>& driven) {
   Crop c{g.width_cells, g.height_cells, 0, 0};
+  bool any_known = false;
   for (int iy = 0; iy < g.height_cells; ++iy) {
     for (int ix = 0; ix < g.width_cells; ++ix) {
-      if (std::isnan(value[g.index(ix, iy)])) continue;
+      const bool known = !std::isnan(value[g.index(ix, iy)]);
+      if (!known && !driven[g.index(ix, iy)]) continue;
+      any_known = any_known || known;
       c.low_x = std::min(c.low_x, ix);
       c.high_x = std::max(c.high_x, ix + 1);
       c.low_y = std::min(c.low_y, iy);
       c.high_y = std::max(c.high_y, iy + 1);
     }
   }
-  if (c.low_x >= c.high_x) throw UserError("nothing was seen within range; the map would be empty.");
+  if (!any_known) throw UserError("nothing was seen within range; the map would be empty.");
   constexpr int kMargin_cells = 10;
   return {std::max(0, c.low_x - kMargin_cells), std::max(0, c.low_y - kMargin_cells),
           std::min(g.width_cells, c.high_x + kMargin_cells),
@@ -217,7 +220,17 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
   GridGeometry geometry = surface_extent(config_, drives, corrected);
   MapSurface surface = build_surface(config_, drives, corrected, joint.offset, geometry,
                                      [&](double fraction) { report("surface", fraction); });
-  const Crop part = known_part(geometry, surface.value_m);
+  std::vector<Trajectory> trajectories;
+  std::vector<bool> driven(geometry.cell_count(), false);
+  for (std::size_t d = 0; d < drives.size(); ++d) {
+    Trajectory& trajectory = trajectories.emplace_back();
+    for (const StampedPose2& pose : drives[d].trajectory) {
+      trajectory.push_back({pose.stamp_s, corrected[d].at(pose.stamp_s, pose.T_map_robot)});
+    }
+    if (config_.robot_radius_m > 0.0) mark_driven(geometry, trajectory, config_.robot_radius_m + config_.driven_margin_m, &driven);
+  }
+  const Crop part = known_part(geometry, surface.value_m, driven);
+  crop(part, geometry, &driven);
   crop(part, geometry, &surface.value_m);
   crop(part, geometry, &surface.measured);
   geometry = cropped(part, geometry);
@@ -233,15 +246,6 @@ BuiltMap MapBuilder::build(const std::function<void(const char*, double)>& progr
   map.distance.distance_m = config_.distance == "paper" ? ray_traced_distance_m(geometry, value, 3600)
                                                         : contour_distance_m(geometry, built.contour);
 
-  std::vector<Trajectory> trajectories;
-  std::vector<bool> driven(geometry.cell_count(), false);
-  for (std::size_t d = 0; d < drives.size(); ++d) {
-    Trajectory& trajectory = trajectories.emplace_back();
-    for (const StampedPose2& pose : drives[d].trajectory) {
-      trajectory.push_back({pose.stamp_s, corrected[d].at(pose.stamp_s, pose.T_map_robot)});
-    }
-    if (config_.robot_radius_m > 0.0) mark_driven(geometry, trajectory, config_.robot_radius_m + config_.driven_margin_m, &driven);
-  }
   map.trajectory = joined(trajectories);
   built.drive = drives.back().trajectory;
   const Pose2 T_start_odom = drives.back().odometry.front().T_map_robot.inverse();

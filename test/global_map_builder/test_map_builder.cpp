@@ -119,8 +119,8 @@ TEST(MapBuilder, GroundThatTheRobotStoodOnUnseenIsFreeAsWideAsItsBodyAndTheMargi
   Route drive;
   drive.truth = drive_through({{0, 0}, {3, 0}});
   drive.odometry = drive.truth;
-  // Beside the start, where the camera never looked: how far off the last free cell's middle is.
-  const auto free_beside_start_m = [&](double margin_m) {
+  // Behind the start, where the camera never looked and nothing is known: how far off the last free cell's middle is.
+  const auto free_behind_start_m = [&](double margin_m) {
     MapBuilderConfig config = only(true, true);
     config.robot_radius_m = 0.2;
     config.driven_margin_m = margin_m;
@@ -128,13 +128,14 @@ TEST(MapBuilder, GroundThatTheRobotStoodOnUnseenIsFreeAsWideAsItsBodyAndTheMargi
     feed(drive, {}, &builder);
     const BuiltMap built = builder.build();
     const GridGeometry& g = built.map.occupancy.geometry;
+    const int iy = g.cell_y(0.0);
     double free_m = 0.0;
-    for (int iy = g.cell_y(0.01); built.map.occupancy.value[g.index(g.cell_x(0.0), iy)] == 0; ++iy) free_m = g.center_y_m(iy);
+    for (int ix = g.cell_x(-0.01); g.contains(ix, iy) && built.map.occupancy.value[g.index(ix, iy)] == 0; --ix) free_m = -g.center_x_m(ix);
     return free_m;
   };
   const double cell_m = 0.05;
-  EXPECT_NEAR(free_beside_start_m(0.0), 0.2, cell_m);
-  EXPECT_NEAR(free_beside_start_m(0.1), 0.3, cell_m);
+  EXPECT_NEAR(free_behind_start_m(0.0), 0.2, cell_m);
+  EXPECT_NEAR(free_behind_start_m(0.1), 0.3, cell_m);
 }
 
 TEST(MapBuilder, SaysWhenThereIsNothingToMap) {
