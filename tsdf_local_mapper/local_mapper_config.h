@@ -19,7 +19,7 @@ namespace knav {
 struct FilterConfig {
   int particles = 2000;
   int threads = 1;
-  int readings = 120;
+  int readings = 200;
   std::string alignment_cost = "normalized";
   double temperature = 0.0003;
   double misfit_cost = 0.03;
