@@ -144,7 +144,7 @@ void HalfSeen::put(const std::vector<Point2>& middles, double radius_m, const Ce
 template <class MayBe>
 void HalfSeen::occupy(int cx, int cy, double radius_m, const CellWindow& window, const Point2& robot, const MayBe& may_be,
                       std::vector<CellState>* local, std::vector<SurfaceOffset>* surface) const {
-  const double r = radius_m / geometry_.resolution_m;
+  const double r = radius_m / geometry_.resolution_m + 1e-6;  // 0.3 m are six cells of 0.05
   any_round(window, cx, cy, static_cast<int>(r), [&](int x, int y) {
     const std::size_t i = at(window, x, y);
     const bool robots = std::hypot(geometry_.center_x_m(x) - robot.x_m, geometry_.center_y_m(y) - robot.y_m) < keep_off_m_;
