@@ -38,7 +38,7 @@ std::size_t at(const CellWindow& window, int ix, int iy) {
 
 void HalfSeen::reset(const GridGeometry& geometry) {
   geometry_ = geometry;
-  seen_.assign(wider_m_ > 0.0 ? geometry.cell_count() : 0, Seen::kNo);
+  seen_.assign(wider_m_ > 0.0 || deep_m_ > 0.0 ? geometry.cell_count() : 0, Seen::kNo);
 }
 
 /// What is in view from far enough away has been seen whole; what is gone has not been seen any more.
@@ -128,10 +128,13 @@ void HalfSeen::widen(const MapLayer& global, const CellWindow& window, const Pos
     }
   }
   const Point2 robot{T_map_robot.x_m, T_map_robot.y_m};
-  for (const auto& [cx, cy] : half_) occupy(cx, cy, wider_m_, window, robot, not_occupied, local, surface);
-  for (const auto& [cx, cy] : outline_) occupy(cx, cy, 0.0, window, robot, not_occupied, local, surface);
-  if (deep_m_ <= 0.0) return;
-  for (const auto& [cx, cy] : new_) occupy(cx, cy, deep_m_, window, robot, unknown, local, surface);
+  if (wider_m_ > 0.0) {
+    for (const auto& [cx, cy] : half_) occupy(cx, cy, wider_m_, window, robot, not_occupied, local, surface);
+    for (const auto& [cx, cy] : outline_) occupy(cx, cy, 0.0, window, robot, not_occupied, local, surface);
+  }
+  if (deep_m_ > 0.0) {
+    for (const auto& [cx, cy] : new_) occupy(cx, cy, deep_m_, window, robot, unknown, local, surface);
+  }
 }
 
 void HalfSeen::put(const std::vector<Point2>& middles, double radius_m, const CellWindow& window, const Point2& robot,

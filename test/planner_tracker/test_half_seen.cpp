@@ -122,12 +122,14 @@ CellState at(const CombinedMap& map, double x_m, double y_m) {
 TEST(HalfSeen, WhatTheMapDoesNotHaveHasABackWhereNobodyLooked) {
   const Pose2 robot{3.15, 0.5, 1.57};
   CombinedMap flat(0.7, 65, 25, 0.0, 0.0, {0.1, 1.3, 0.24, 0.0}), deep(0.7, 65, 25, 0.0, 0.0, {0.1, 1.3, 0.24, 0.3});
-  for (CombinedMap* map : {&flat, &deep}) {
+  CombinedMap deep_only(0.7, 65, 25, 0.0, 0.0, {0.0, 1.3, 0.24, 0.3});
+  for (CombinedMap* map : {&flat, &deep, &deep_only}) {
     map->set_global({}, room(6.0, 4.0), {});
     map->set_local(front_of_a_box(), {}, 100.0, robot);
   }
   EXPECT_EQ(at(flat, 3.15, 2.2), CellState::kFree) << "the global map's word";
   EXPECT_EQ(at(deep, 3.15, 2.2), CellState::kSupposed);
+  EXPECT_EQ(at(deep_only, 3.15, 2.2), CellState::kSupposed) << "with half_seen_m off";
   EXPECT_EQ(at(deep, 3.15, 2.32), CellState::kSupposed);
   EXPECT_EQ(at(deep, 3.15, 2.37), CellState::kFree) << "the seventh cell behind the front";
   EXPECT_EQ(at(deep, 3.32, 2.1), CellState::kFree) << "seen beside it";
