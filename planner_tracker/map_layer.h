@@ -17,7 +17,7 @@ enum class CellState : std::uint8_t {
   kFree = 1,
   kOccupied = 2,
   kKeepout = 3,
-  kSupposed = 4,  ///< nothing was seen there, but somebody may be, see HalfSeen and Walkers: not driven on, and neither remembered nor taken for motion
+  kSupposed = 4,  ///< nothing was seen there, but somebody or something may be, see HalfSeen and Walkers: not driven on, and neither remembered nor taken for motion
 };
 
 /// One map with the clearance of each of its cells. Only free cells are open; unknown is never free.

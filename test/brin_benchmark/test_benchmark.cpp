@@ -126,9 +126,12 @@ TEST(Configurations, ThePapersTwoRunsDifferInTheTwoKeysOnly) {
   }
   EXPECT_EQ(full.size(), baseline.size());
   EXPECT_EQ(different, (std::vector<std::string>{"/navigation/local_map", "/navigation/localize_with"}));
+  // The literal one has the same localizer.
+  const std::string literal_file = configuration_file("paper_literal");
+  EXPECT_EQ(YAML::Dump(YAML::LoadFile(literal_file)["localizer"]), YAML::Dump(YAML::LoadFile(configuration_file("paper_full"))["localizer"]));
   // And both are good configurations.
   EXPECT_FALSE(NavigationStackConfig::from_file(configuration_file("paper_baseline")).input.local_map);
-  EXPECT_EQ(NavigationStackConfig::from_file(configuration_file("paper_literal")).local_mapper.filter.alignment_cost, "paper");
+  EXPECT_EQ(NavigationStackConfig::from_file(literal_file).local_mapper.filter.alignment_cost, "paper");
   EXPECT_EQ(configuration_file("default"), "");
   EXPECT_THROW(configuration_file("papper"), UserError);
 }
