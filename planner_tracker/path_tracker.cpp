@@ -221,11 +221,7 @@ TrackOutput PathTracker::follow(const TrackInput& input, const Path& path) {
   }
 
   // Every limit has its own reason; the lowest holds.
-  const double near_share =
-      std::clamp((ahead.least_clearance_m - hard_radius_m_) / std::max(0.01, preferred_radius_m_ - hard_radius_m_),
-                 0.0, 1.0);
-  double v = t.slow_mps + (config_.max_vel_x - t.slow_mps) * near_share;
-  v = std::min({v, config_.max_vel_x, speed_near_moving_mps(input, ahead)});
+  double v = std::min({ahead.speed_mps, config_.max_vel_x, speed_near_moving_mps(input, ahead)});
   v *= std::clamp(1.0 - 0.8 * (std::abs(bearing) - 0.2) / t.turn_first_rad, 0.15, 1.0);
   if (std::abs(curvature) > 1e-6) v = std::min(v, config_.max_vel_theta / std::abs(curvature));
   v = std::min(v, std::sqrt(2.0 * 0.7 * config_.acc_lim_x * std::max(0.0, path.remaining_m())) + 0.01);

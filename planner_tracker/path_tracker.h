@@ -52,9 +52,10 @@ class PathTracker {
   double straight_free_m(const TrackInput& input, double bearing_rad, double length_m) const;
   /// How far the robot may turn on the spot [rad], to the left (+1) or right (-1), at most `most_rad`.
   double turn_free_rad(const TrackInput& input, double side, double most_rad) const;
-  /// How far an arc may be driven [m], at most up to `length_m`; and its least clearance within `near_m`.
+  /// How far an arc may be driven [m], at most up to `length_m`; its least clearance within `near_m`; and how fast one may go
+  /// now, so that wherever it is narrow the robot has slowed down to what clearance allows there.
   struct Rollout {
-    double free_m = 0.0, least_clearance_m = 0.0;
+    double free_m = 0.0, least_clearance_m = 0.0, speed_mps = 0.0;
     double end_x_m = 0.0, end_y_m = 0.0;  ///< in the robot's frame, where it stopped being free
   };
   Rollout roll_out(const TrackInput& input, double curvature_radpm, double length_m, double near_m,
@@ -74,6 +75,10 @@ class PathTracker {
   bool still_passes(const TrackInput& input) const;
   /// True if the arc to this point of the robot's frame sweeps ground that the local map has not seen.
   bool sweeps_unseen(const TrackInput& input, const Point2& target) const;
+  /// What this clearance_m() allows: slow_mps at the hard clearance, max_vel_x from the preferred one on.
+  double speed_at_mps(double clearance_m) const;
+  /// What lets the robot be down to that speed this far ahead, at acc_lim_x after reaction_s.
+  double speed_before_mps(double distance_m, double then_mps) const;
   /// What moves nearby allows.
   double speed_near_moving_mps(const TrackInput& input, const Rollout& ahead) const;
   /// True if somebody who walks where the camera does not look will come too near to a robot that drives this arc.

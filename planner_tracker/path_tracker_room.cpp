@@ -68,11 +68,23 @@ bool PathTracker::sweeps_unseen(const TrackInput& input, const Point2& target) c
   return false;
 }
 
+double PathTracker::speed_at_mps(double clearance_m) const {
+  const double share = (clearance_m - hard_radius_m_) / std::max(0.01, preferred_radius_m_ - hard_radius_m_);
+  return config_.tracking.slow_mps + (config_.max_vel_x - config_.tracking.slow_mps) * std::clamp(share, 0.0, 1.0);
+}
+
+double PathTracker::speed_before_mps(double distance_m, double then_mps) const {
+  // distance = v delay + (v^2 - then^2) / (2 a), for v
+  const double a = config_.acc_lim_x, late = a * config_.tracking.reaction_s;
+  return std::max(then_mps, std::sqrt(late * late + then_mps * then_mps + 2.0 * a * distance_m) - late);
+}
+
 PathTracker::Rollout PathTracker::roll_out(const TrackInput& input, double curvature, double length_m,
                                            double near_m, bool backwards) const {
   Rollout out;
   const double here = clearance_m(input, 0.0, 0.0, 0.0);
   out.least_clearance_m = here;
+  out.speed_mps = speed_at_mps(here);
   // Standing too near to something already, it may move, but not come nearer.
   double demanded = std::min(stop_radius_m_, here - 0.005);
   double yaw = 0.0;
@@ -88,6 +100,7 @@ PathTracker::Rollout PathTracker::roll_out(const TrackInput& input, double curva
     out.end_y_m = y;
     out.free_m = s + kStep_m;
     if (out.free_m <= near_m) out.least_clearance_m = std::min(out.least_clearance_m, c);
+    out.speed_mps = std::min(out.speed_mps, speed_before_mps(out.free_m, speed_at_mps(c)));
   }
   return out;
 }

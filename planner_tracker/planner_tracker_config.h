@@ -105,7 +105,7 @@ struct TrackingConfig {
   double turn_first_rad = 0.60;
   double unseen_turn_first_rad = 0.16;
   double turned_rad = 0.15;
-  double slow_mps = 0.15;
+  double slow_mps = 0.25;
   double reaction_s = 0.20;
   double horizon_s = 1.5;
   double min_in_place_vel_theta = 0.15;
@@ -200,7 +200,7 @@ struct PlannerTrackerConfig {
   double max_vel_x = 0.6;
   double min_vel_x = -0.10;
   double max_vel_theta = 1.2;
-  double acc_lim_x = 0.6;
+  double acc_lim_x = 1.0;
   double acc_lim_theta = 2.5;
   double robot_radius = 0.20;
   std::string footprint;
@@ -241,7 +241,7 @@ struct PlannerTrackerConfig {
              "Fastest backwards, used only over a goal just overshot and where scan_360 shows free space; 0 "
              "= never.");
     v.number("max_vel_theta", max_vel_theta, 0.1, 10, "rad/s", "Fastest turn.");
-    v.number("acc_lim_x", acc_lim_x, 0.05, 10, "m/s^2", "Acceleration.");
+    v.number("acc_lim_x", acc_lim_x, 0.05, 10, "m/s^2", "Acceleration, and slowing down where nothing hurries (see tracking/stop_decel_mps2).");
     v.number("acc_lim_theta", acc_lim_theta, 0.1, 50, "rad/s^2", "Acceleration of turns.");
     v.number("robot_radius", robot_radius, 0.02, 2, "m", "Footprint, a disc round base_link, where `footprint` is empty.");
     v.text("footprint", footprint,

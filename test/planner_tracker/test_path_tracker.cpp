@@ -55,6 +55,44 @@ TEST(Tracker, WhereTheArcSweepsUnseenGroundTheRobotTurnsToLookFirst) {
   }
 }
 
+TEST(Tracker, BeforeSomethingBesideTheWayItIsDownToTheSpeedAllowedThereAndNoSlowerBefore) {
+  // A wall's end 0.30 m beside a straight way, 1.5 m ahead: 0.10 m beyond the robot's radius, where 0.25 + 0.35 (0.10 - 0.04) / (0.25 - 0.04)
+  // = 0.35 m/s are allowed. From 0.6 m/s at 1 m/s^2 that takes 0.12 m of driving on and (0.36 - 0.1225) / 2 = 0.119 m of braking: the robot is
+  // still fast 0.4 m before the place from where the corner is 0.30 m off, and slow when it is there.
+  PlannerTrackerConfig config;
+  config.max_vel_x = 0.6;
+  config.acc_lim_x = 1.0;
+  config.tracking.slow_mps = 0.25;
+  config.tracking.reaction_s = 0.2;
+  OccupancyGrid grid = room(5.0, 4.0);
+  fill(&grid, 2.5, 2.3, 2.55, 4.0, 100);
+  CombinedMap map(0.6, config.clearance.occupied_threshold, config.clearance.free_threshold);
+  map.set_global({}, grid, {});
+  map.set_local(grid, Pose2{});
+  const ScanView view = open_view();
+  Path path;
+  path.set({{0.5, 2.0}, {4.5, 2.0}});
+  PathTracker tracker(config);
+  TrackInput input;
+  input.T_map_base = {0.5, 2.0, 0.0};
+  input.v_mps = 0.6;
+  input.layer = &map.combined();
+  input.map = &map;
+  input.scan = &view;
+  double at_the_wall_mps = 0.0, fast_until_m = 0.0;
+  while (input.T_map_base.x_m < 2.525) {
+    path.advance({input.T_map_base.x_m, input.T_map_base.y_m});
+    const TrackOutput out = tracker.follow(input, path);
+    ASSERT_EQ(out.kind, TrackOutput::Kind::kDriving);
+    input.v_mps = at_the_wall_mps = out.v_mps;
+    if (out.v_mps > 0.59) fast_until_m = input.T_map_base.x_m;
+    input.T_map_base.x_m += out.v_mps * input.dt_s;
+  }
+  EXPECT_GT(fast_until_m, 2.525 - 0.5);
+  // A control step at 1 m/s^2 is 0.05 m/s; the clearance of a grid of 5 cm cells errs by 2 cm.
+  EXPECT_NEAR(at_the_wall_mps, 0.35, 0.06);
+}
+
 TEST(Tracker, BesideThePathsEndAndUnableToReachItTheRobotIsBlockedAndDoesNotStandThereAsIfItDrove) {
   // The path's last 3 cm, with the robot 12 cm to their side and something 0.28 m before it on its straight way there: room for 7 cm.
   const PlannerTrackerConfig config;

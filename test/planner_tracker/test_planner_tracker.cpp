@@ -58,12 +58,16 @@ TEST(Drive, TurnsInPlaceFirstWhenThePathStartsBehind) {
 
 TEST(Drive, CommandsKeepAccelerationLimits) {
   const OccupancyGrid grid = two_rooms();
-  ToyWorld world(grid, grid, {1.0, 1.0, -1.0});
+  PlannerTrackerConfig config;
+  config.acc_lim_x = 0.4;
+  config.tracking.stop_decel_mps2 = 1.0;
+  config.acc_lim_theta = 2.5;
+  ToyWorld world(grid, grid, {1.0, 1.0, -1.0}, config);
   world.planner.set_goal({10.5, 1.5, 0.0});
   Command last, command;
   for (int i = 0; i < 1200 && !command.finished; ++i) {
     command = world.step();
-    EXPECT_LE(command.v_mps - last.v_mps, 0.6 * 0.05 + 1e-9);
+    EXPECT_LE(command.v_mps - last.v_mps, 0.4 * 0.05 + 1e-9);
     EXPECT_GE(command.v_mps - last.v_mps, -1.0 * 0.05 - 1e-9);
     EXPECT_LE(std::abs(command.w_radps - last.w_radps), 2.5 * 0.05 + 1e-9);
     last = command;
@@ -131,7 +135,8 @@ TEST(Goal, WhatTheLocalizerCorrectsWhileTheRobotTurnsAtItIsMadeGood) {
     if (corrections == 0) {
       EXPECT_GT(world.distance_to(goal), 0.06);
     } else {
-      EXPECT_LT(world.distance_to(goal), 0.05);
+      // Within the tolerance by the pose it had, which errs.
+      EXPECT_LT(world.distance_to(goal), config.xy_goal_tolerance + 2.0 * world.pose_noise_m);
     }
     EXPECT_LT(std::abs(normalize_angle_rad(world.T_map_base.yaw_rad - goal.yaw_rad)), 0.1);
   }
