@@ -9,13 +9,14 @@ namespace {
 
 constexpr float kNear_m = 0.05f;
 constexpr float kFar_m = 60.0f;       ///< nothing gives a reading from there
-constexpr float kMarginRows = 4.0f;   ///< for what moves between the first and the last row
+constexpr float kMargin_px = 4.0f;    ///< for what moves between the first and the last row
+constexpr float kNearer = 1.01f;      ///< the same, of inverse depth
 constexpr float kOverlap_px = 1e-3f;  ///< so that rounding leaves no crack between neighbouring faces
 
 }  // namespace
 
 DepthRenderer::DepthRenderer(const WorldMeshes& meshes, const PinholeModel& camera)
-    : meshes_(&meshes), camera_(camera) {
+    : meshes_(&meshes), camera_(camera), buffer_(camera.width_px) {
   for (std::size_t piece = 0; piece < meshes.meshes().size(); ++piece) {
     const Mesh& mesh = meshes.meshes()[piece];
     const auto offset = static_cast<std::uint32_t>(vertices_.size());
@@ -30,18 +31,16 @@ DepthRenderer::DepthRenderer(const WorldMeshes& meshes, const PinholeModel& came
   active_.reserve(faces_.size());
   const auto width = static_cast<std::size_t>(camera.width_px);
   column_x_.resize(width);
-  inverse_z_.resize(width);
-  face_of_column_.resize(width);
   for (std::size_t u = 0; u < width; ++u) {
     column_x_[u] = static_cast<float>((static_cast<double>(u) - camera.cx_px) / camera.fx_px);
   }
 }
 
-bool DepthRenderer::row_range(const WorldFace& face, const Eigen::Isometry3f& T_optical_world, float* low,
-                              float* high) const {
+bool DepthRenderer::widen(const WorldFace& face, const Eigen::Isometry3f& T_optical_world, Extent* extent) const {
   const auto slope = static_cast<float>(camera_.width_px / camera_.fx_px);  // generous: margin for turning
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   bool all_left = true, all_right = true, all_near = true, any_near = false, all_far = true;
-  float v_low = std::numeric_limits<float>::infinity(), v_high = -v_low;
+  Extent seen{kInfinity, -kInfinity, kInfinity, -kInfinity, 0.0f};
   for (std::uint32_t k = 0; k < face.count; ++k) {
     const Eigen::Vector3f p = T_optical_world * vertices_[face.first + k];
     all_left = all_left && p.x() < -slope * p.z();
@@ -53,13 +52,28 @@ bool DepthRenderer::row_range(const WorldFace& face, const Eigen::Isometry3f& T_
     }
     all_near = false;
     const float v = static_cast<float>(camera_.cy_px) + static_cast<float>(camera_.fy_px) * p.y() / p.z();
-    v_low = std::min(v_low, v);
-    v_high = std::max(v_high, v);
+    const float u = static_cast<float>(camera_.cx_px) + static_cast<float>(camera_.fx_px) * p.x() / p.z();
+    seen.low_row = std::min(seen.low_row, v);
+    seen.high_row = std::max(seen.high_row, v);
+    seen.low_column = std::min(seen.low_column, u);
+    seen.high_column = std::max(seen.high_column, u);
+    seen.inverse_z = std::max(seen.inverse_z, 1.0f / p.z());
   }
   if (all_near || all_left || all_right || all_far) return false;
-  *low = std::min(*low, any_near ? 0.0f : v_low);
-  *high = std::max(*high, any_near ? static_cast<float>(camera_.height_px) : v_high);
+  if (any_near) {
+    seen = {0.0f, static_cast<float>(camera_.height_px), 0.0f, static_cast<float>(camera_.width_px), kInfinity};
+  }
+  extent->low_row = std::min(extent->low_row, seen.low_row);
+  extent->high_row = std::max(extent->high_row, seen.high_row);
+  extent->low_column = std::min(extent->low_column, seen.low_column);
+  extent->high_column = std::max(extent->high_column, seen.high_column);
+  extent->inverse_z = std::max(extent->inverse_z, seen.inverse_z);
   return true;
+}
+
+bool DepthRenderer::in_front(std::int32_t a, std::int32_t b) const {
+  const float za = faces_[static_cast<std::size_t>(a)].inverse_z, zb = faces_[static_cast<std::size_t>(b)].inverse_z;
+  return za != zb ? za > zb : a < b;
 }
 
 void DepthRenderer::start_frame(const DynamicState& state, const Eigen::Isometry3f& T_world_optical_first,
@@ -90,15 +104,22 @@ void DepthRenderer::start_frame(const DynamicState& state, const Eigen::Isometry
     const bool faces_away = f.normal.dot(T_world_optical_first.translation() - p) <= 0.0f &&
                             f.normal.dot(T_world_optical_last.translation() - p) <= 0.0f;
     if (faces_away) continue;
-    float low = std::numeric_limits<float>::infinity(), high = -low;
-    const bool seen_first = row_range(f, to_first, &low, &high),
-               seen_last = row_range(f, to_last, &low, &high);
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    Extent extent{kInfinity, -kInfinity, kInfinity, -kInfinity, 0.0f};
+    const bool seen_first = widen(f, to_first, &extent), seen_last = widen(f, to_last, &extent);
     if (!seen_first && !seen_last) continue;
-    low = std::max(low - kMarginRows, 0.0f);
-    high = std::min(high + kMarginRows, static_cast<float>(camera_.height_px - 1));
-    if (low > high) continue;
+    if (seen_first != seen_last) extent.inverse_z = kInfinity;
+    const float low = std::max(extent.low_row - kMargin_px, 0.0f);
+    const float high = std::min(extent.high_row + kMargin_px, static_cast<float>(camera_.height_px - 1));
+    const float left = seen_first != seen_last ? 0.0f : std::max(extent.low_column - kMargin_px, 0.0f);
+    const float right = seen_first != seen_last ? static_cast<float>(camera_.width_px - 1)
+                                                : std::min(extent.high_column + kMargin_px, static_cast<float>(camera_.width_px - 1));
+    if (low > high || left > right) continue;
     f.first_row = static_cast<int>(low);
     f.last_row = static_cast<int>(high);
+    f.first_column = static_cast<int>(left);
+    f.last_column = static_cast<int>(right);
+    f.inverse_z = kNearer * extent.inverse_z;
     order_.push_back(static_cast<std::int32_t>(i));
   }
   std::sort(order_.begin(), order_.end(), [&](std::int32_t a, std::int32_t b) {
@@ -145,14 +166,7 @@ void DepthRenderer::draw(const WorldFace& face, std::int32_t index) {
   const int begin = static_cast<int>(std::ceil(std::max(u0 - kOverlap_px, 0.0f)));
   const int end = static_cast<int>(std::floor(std::min(u1 + kOverlap_px, last_column))) + 1;
   const float slope = u1 - u0 > 0.01f ? (inverse1 - inverse0) / (u1 - u0) : 0.0f;
-  float* inverse_z = inverse_z_.data();
-  std::int32_t* face_of_column = face_of_column_.data();
-  for (int u = begin; u < end; ++u) {
-    const float value = inverse0 + (static_cast<float>(u) - u0) * slope;
-    const bool nearer = value > inverse_z[u];
-    inverse_z[u] = nearer ? value : inverse_z[u];
-    face_of_column[u] = nearer ? index : face_of_column[u];
-  }
+  buffer_.draw(begin, end, inverse0, u0, slope, index);
 }
 
 void DepthRenderer::render_row(const Eigen::Isometry3f& T_world_optical, int row, float* z_m, float* signal) {
@@ -162,21 +176,22 @@ void DepthRenderer::render_row(const Eigen::Isometry3f& T_world_optical, int row
   forward_ = T_world_optical.linear().col(2);
   const Eigen::Vector3f base = forward_ + y * T_world_optical.linear().col(1);
   normal_ = base.cross(side_);
-  std::fill(inverse_z_.begin(), inverse_z_.end(), 0.0f);
-  std::fill(face_of_column_.begin(), face_of_column_.end(), -1);
+  buffer_.clear();
 
   while (next_ < order_.size() && faces_[static_cast<std::size_t>(order_[next_])].first_row <= row) {
-    active_.push_back(order_[next_++]);
+    const std::int32_t index = order_[next_++];
+    const auto behind = [this](std::int32_t a, std::int32_t b) { return in_front(a, b); };
+    active_.insert(std::upper_bound(active_.begin(), active_.end(), index, behind), index);
   }
   std::size_t kept = 0;
   for (const std::int32_t index : active_) {
     const WorldFace& face = faces_[static_cast<std::size_t>(index)];
     if (face.last_row < row) continue;
     active_[kept++] = index;
-    draw(face, index);
+    if (!buffer_.hides(face.first_column, face.last_column + 1, face.inverse_z)) draw(face, index);
   }
   active_.resize(kept);
-  for (int u = 0; u < camera_.width_px; ++u) z_m[u] = 1.0f / inverse_z_[static_cast<std::size_t>(u)];
+  for (int u = 0; u < camera_.width_px; ++u) z_m[u] = 1.0f / buffer_.inverse_z(u);
   if (signal) shade(y, base, side_, signal);
 }
 
@@ -186,9 +201,9 @@ void DepthRenderer::shade(float y, const Eigen::Vector3f& base, const Eigen::Vec
   const float* x = column_x_.data();
   int start = 0;
   while (start < width) {
-    const std::int32_t index = face_of_column_[static_cast<std::size_t>(start)];
+    const std::int32_t index = buffer_.owner(start);
     int end = start + 1;
-    while (end < width && face_of_column_[static_cast<std::size_t>(end)] == index) ++end;
+    while (end < width && buffer_.owner(end) == index) ++end;
     if (index < 0) {
       std::fill(signal + start, signal + end, 0.0f);
     } else {

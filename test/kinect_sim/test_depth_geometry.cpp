@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "kinect_sim/depth_renderer.h"
+#include "kinect_sim/row_buffer.h"
 #include "kinect_sim/scene.h"
 #include "kinect_sim/simulator.h"
 
@@ -88,6 +89,79 @@ TEST(DepthGeometry, EveryPixelAgreesWithARayCastByEmbree) {
   }
   // Only pixels whose ray grazes an edge may fall to one side or the other.
   EXPECT_LE(different, 20) << "of " << 160 * 214;
+}
+
+TEST(DepthGeometry, WhatIsLeftOutAsHiddenIsHiddenThroughoutABuildingAndATurn) {
+  // A building, so that most faces are behind others; 60 degrees a second and half a metre a second from the first row to the last.
+  const WorldConfig world = load_world(std::string(KINECT_NAV_SOURCE_DIR) + "/config/worlds/brin_building.yaml");
+  const WorldMeshes meshes(world);
+  Scene scene(meshes);
+  PinholeModel camera;
+  camera.width_px = 640;
+  camera.height_px = 480;
+  camera.fx_px = camera.fy_px = 585.0;
+  camera.cx_px = 319.5;
+  camera.cy_px = 239.5;
+  DepthRenderer renderer(meshes, camera);
+  DynamicState state;
+  state.people.resize(world.people.size());
+  state.door_open_rad.assign(world.doors.size(), 0.0);
+  state.timed_solid_present.assign(64, 1);
+  scene.update(state);
+  Eigen::Matrix3f R_base_optical;
+  R_base_optical << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  std::vector<float> z_m(640);
+  long different = 0, pixels = 0, far = 0;
+  for (const Pose2& start : {Pose2{0.0, 0.0, 0.0}, Pose2{20.0, -0.3, 1.6}, Pose2{40.0, 3.0, 2.5}, Pose2{60.0, -8.0, -2.0}, Pose2{50.0, 6.0, 0.3}}) {
+    const auto optical = [&](int row) {
+      const float share = static_cast<float>(row) / 479.0f;
+      Eigen::Isometry3f T = Eigen::Isometry3f::Identity();
+      const float yaw = static_cast<float>(start.yaw_rad) + 0.035f * share;
+      T.linear() = Eigen::AngleAxisf(yaw, Eigen::Vector3f::UnitZ()).toRotationMatrix() * R_base_optical;
+      T.translation() << static_cast<float>(start.x_m) + 0.017f * share * std::cos(yaw), static_cast<float>(start.y_m) + 0.017f * share * std::sin(yaw), 0.5f;
+      return T;
+    };
+    renderer.start_frame(state, optical(0), optical(479));
+    for (int v = 0; v < 480; ++v) {
+      const Eigen::Isometry3f T = optical(v);
+      renderer.render_row(T, v, z_m.data(), nullptr);
+      if (v % 7 != 0) continue;
+      for (int u = 0; u < 640; u += 5) {
+        const Eigen::Vector3f ray(static_cast<float>((u - camera.cx_px) / camera.fx_px), static_cast<float>((v - camera.cy_px) / camera.fy_px), 1.0f);
+        const float truth = scene.cast(T.translation(), T.linear() * ray, 60.0f), seen = z_m[static_cast<std::size_t>(u)];
+        ++pixels;
+        far += truth > 4.0f;
+        if (!std::isfinite(truth) && !(seen < 59.0f)) continue;
+        if (!(std::abs(truth - seen) <= 1e-3f * truth)) ++different;
+      }
+    }
+  }
+  EXPECT_GT(far, pixels / 5);
+  // Only pixels whose ray grazes an edge may fall to one side or the other.
+  EXPECT_LE(different, pixels / 1000) << "of " << pixels;
+}
+
+TEST(RowBuffer, HidesWhatIsNoNearerAllOverItsColumnsAndNothingElse) {
+  RowBuffer row(40);
+  row.clear();
+  EXPECT_FALSE(row.hides(0, 40, 0.1f));
+  row.draw(0, 30, 0.5f, 0.0f, 0.0f, 7);  // 2 m, columns 0 to 29
+  EXPECT_TRUE(row.hides(0, 16, 0.5f));   // no nearer than what is there
+  EXPECT_TRUE(row.hides(3, 14, 0.2f));
+  EXPECT_FALSE(row.hides(3, 14, 0.51f));
+  EXPECT_FALSE(row.hides(0, 40, 0.2f));   // columns 30 to 39 are open
+  EXPECT_FALSE(row.hides(16, 30, 0.2f));  // so are two of their block: it may be drawn for nothing
+  row.draw(30, 40, 0.25f, 30.0f, -0.01f, 8);
+  EXPECT_TRUE(row.hides(0, 40, 0.16f));
+  EXPECT_FALSE(row.hides(0, 40, 0.17f));  // 0.25 - 9 x 0.01 at column 39
+  row.draw(0, 40, 0.3f, 0.0f, 0.0f, 9);   // behind the first, before the second
+  EXPECT_EQ(row.owner(29), 7);
+  EXPECT_EQ(row.owner(30), 9);
+  EXPECT_FLOAT_EQ(row.inverse_z(39), 0.3f);
+  EXPECT_TRUE(row.hides(0, 40, 0.3f));
+  row.clear();
+  EXPECT_EQ(row.owner(5), -1);
+  EXPECT_FALSE(row.hides(0, 16, 0.1f));
 }
 
 TEST(DepthGeometry, MillimetresComeOutWithoutNoiseInTheIdealSensor) {
