@@ -7,6 +7,7 @@
 namespace knav {
 namespace {
 
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNear_m = 0.05f;
 constexpr float kFar_m = 60.0f;       ///< nothing gives a reading from there
 constexpr float kMargin_px = 4.0f;    ///< for what moves between the first and the last row
@@ -38,7 +39,6 @@ DepthRenderer::DepthRenderer(const WorldMeshes& meshes, const PinholeModel& came
 
 bool DepthRenderer::widen(const WorldFace& face, const Eigen::Isometry3f& T_optical_world, Extent* extent) const {
   const auto slope = static_cast<float>(camera_.width_px / camera_.fx_px);  // generous: margin for turning
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   bool all_left = true, all_right = true, all_near = true, any_near = false, all_far = true;
   Extent seen{kInfinity, -kInfinity, kInfinity, -kInfinity, 0.0f};
   for (std::uint32_t k = 0; k < face.count; ++k) {
@@ -104,16 +104,19 @@ void DepthRenderer::start_frame(const DynamicState& state, const Eigen::Isometry
     const bool faces_away = f.normal.dot(T_world_optical_first.translation() - p) <= 0.0f &&
                             f.normal.dot(T_world_optical_last.translation() - p) <= 0.0f;
     if (faces_away) continue;
-    constexpr float kInfinity = std::numeric_limits<float>::infinity();
     Extent extent{kInfinity, -kInfinity, kInfinity, -kInfinity, 0.0f};
     const bool seen_first = widen(f, to_first, &extent), seen_last = widen(f, to_last, &extent);
     if (!seen_first && !seen_last) continue;
-    if (seen_first != seen_last) extent.inverse_z = kInfinity;
+    if (seen_first != seen_last) {
+      // It comes into view: where and how near in between is not known.
+      extent.low_column = 0.0f;
+      extent.high_column = static_cast<float>(camera_.width_px);
+      extent.inverse_z = kInfinity;
+    }
     const float low = std::max(extent.low_row - kMargin_px, 0.0f);
     const float high = std::min(extent.high_row + kMargin_px, static_cast<float>(camera_.height_px - 1));
-    const float left = seen_first != seen_last ? 0.0f : std::max(extent.low_column - kMargin_px, 0.0f);
-    const float right = seen_first != seen_last ? static_cast<float>(camera_.width_px - 1)
-                                                : std::min(extent.high_column + kMargin_px, static_cast<float>(camera_.width_px - 1));
+    const float left = std::max(extent.low_column - kMargin_px, 0.0f);
+    const float right = std::min(extent.high_column + kMargin_px, static_cast<float>(camera_.width_px - 1));
     if (low > high || left > right) continue;
     f.first_row = static_cast<int>(low);
     f.last_row = static_cast<int>(high);

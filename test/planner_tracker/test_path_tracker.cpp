@@ -58,7 +58,7 @@ TEST(Tracker, WhereTheArcSweepsUnseenGroundTheRobotTurnsToLookFirst) {
 TEST(Tracker, BeforeSomethingBesideTheWayItIsDownToTheSpeedAllowedThereAndNoSlowerBefore) {
   // A wall's end 0.30 m beside a straight way, 1.5 m ahead: 0.10 m beyond the robot's radius, where 0.25 + 0.35 (0.10 - 0.04) / (0.25 - 0.04)
   // = 0.35 m/s are allowed. From 0.6 m/s at 1 m/s^2 that takes 0.12 m of driving on and (0.36 - 0.1225) / 2 = 0.119 m of braking: the robot is
-  // still fast 0.4 m before the place from where the corner is 0.30 m off, and slow when it is there.
+  // still fast half a metre before the wall (who looks at the least clearance within 0.6 m is not), and slow when it is there.
   PlannerTrackerConfig config;
   config.max_vel_x = 0.6;
   config.acc_lim_x = 1.0;
